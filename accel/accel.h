@@ -1,0 +1,111 @@
+// Ray tracing behind one interface: Embree, our agglomerative BVH, or the host's own callbacks.
+// Every call is a batch, so that no virtual call is paid per ray. All queries are [shared]: concurrent after build.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/aabb.h"
+#include "core/progress.h"
+
+namespace lumicut {
+
+inline constexpr uint32_t kNoId = 0xffffffffu;
+
+// Fields in Embree's order (RTCRay). `dir` need not be a unit vector; distances are in units of its length.
+struct Ray {
+  Vec3f org;
+  float tnear = 0.0f;
+  Vec3f dir;
+  float time = 0.0f;
+  float tfar = std::numeric_limits<float>::infinity();  // shortened to the hit; -inf when found occluded
+  uint32_t mask = 0xffffffffu;                          // a mesh is seen when (mesh.mask & ray.mask) != 0
+  uint32_t id = 0;
+  uint32_t flags = 0;
+};
+
+// Fields in Embree's order (RTCHit). `ng` is not normalised, and in the space of the mesh (before the instance's transform).
+struct Hit {
+  Vec3f ng;
+  float u = 0.0f, v = 0.0f;  // hit = (1-u-v)·v0 + u·v1 + v·v2
+  uint32_t prim = kNoId;
+  uint32_t geom = kNoId;  // index into AccelGeometry::meshes; kNoId: nothing hit
+  uint32_t inst = kNoId;  // index into AccelGeometry::instances; kNoId when the geometry has no instances
+};
+
+struct RayHit {
+  Ray ray;
+  Hit hit;
+};
+
+// Cut-outs: asked for each candidate hit on a mesh with `has_cutout`. Called concurrently.
+class HitFilter {
+ public:
+  virtual ~HitFilter() = default;
+  // True where the surface is a hole and the ray goes on.
+  virtual bool passes(uint32_t mesh, uint32_t prim, float u, float v) const = 0;
+};
+
+// Views of the caller's memory, which must outlive the Accel.
+struct MeshView {
+  const Vec3f* positions = nullptr;
+  size_t position_count = 0;
+  const uint32_t* indices = nullptr;  // three per triangle
+  size_t triangle_count = 0;
+  uint32_t mask = 0xffffffffu;
+  bool has_cutout = false;
+};
+
+struct InstanceView {
+  uint32_t mesh = 0;
+  Transform to_world;
+};
+
+struct AccelGeometry {
+  std::vector<MeshView> meshes;
+  std::vector<InstanceView> instances;  // empty: each mesh once, as it is
+  const HitFilter* filter = nullptr;
+};
+
+struct AccelOptions {
+  bool robust = true;         // watertight on shared edges
+  std::string builder = "";   // agglomerative accel only: see accel/bvh.h; empty: its default
+};
+
+// What a build gave. Costs in the paper's terms. [Walter et al. 2008, Fig. 6]; 0 where the room behind does not tell.
+struct AccelInfo {
+  uint64_t triangles = 0, nodes = 0, bytes = 0;
+  double build_seconds = 0, expected_boxes = 0, expected_tris = 0, expected_cost = 0;
+  Aabb bounds;
+};
+
+class Accel {
+ public:
+  virtual ~Accel() = default;
+  virtual AccelInfo info() const = 0;
+
+  // Closest hits. Rays with NaN fields hit nothing.
+  virtual void intersect(std::span<RayHit> rays) const = 0;
+
+  // Any hit: sets tfar to -inf where something lies in (tnear, tfar).
+  virtual void occluded(std::span<Ray> rays) const = 0;
+
+  // The hot call of the whole project: one light, many nearby points (SoA). Tests the open segments light→point; with
+  // `directional`, `light` is the unit direction towards the light and the ray runs from the point to infinity.
+  // Both ends are expected to be offset from their surfaces already. occluded[i] = 1 where blocked, else 0.
+  // `n` is any number; best in multiples of 16.
+  virtual void occluded_from_point(const Vec3f& light, bool directional, const float* px, const float* py,
+                                   const float* pz, size_t n, uint8_t* occluded) const = 0;
+};
+
+// Makes the accel of that name: "embree" or "agglomerative". Runs on the caller's arena. Throws Error on an unknown name,
+// an index out of range, or a position that is not finite (naming mesh, index and value), and Error(cancelled).
+std::unique_ptr<Accel> make_accel(const std::string& name, const AccelGeometry& geometry, const AccelOptions& options,
+                                  Progress* progress = nullptr);
+
+}  // namespace lumicut

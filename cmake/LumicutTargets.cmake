@@ -1,0 +1,59 @@
+# How every target of the house is made: one compiler setting, one layout of outputs.
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_C_STANDARD 99)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_CXX_VISIBILITY_PRESET hidden)
+set(CMAKE_C_VISIBILITY_PRESET hidden)
+set(CMAKE_VISIBILITY_INLINES_HIDDEN ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+set(CMAKE_LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib)
+set(CMAKE_ARCHIVE_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+
+find_program(CCACHE ccache)
+if(CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+  set(CMAKE_C_COMPILER_LAUNCHER ${CCACHE})
+endif()
+
+add_library(lumicut_options INTERFACE)
+target_compile_options(lumicut_options INTERFACE -Wall -Wextra -Wshadow -Werror
+  $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor -Woverloaded-virtual>)
+# Highway compiles hot loops for a portable fallback, SSE4, AVX2 and AVX-512, and picks one at run time.
+target_compile_definitions(lumicut_options INTERFACE
+  "HWY_DISABLED_TARGETS=HWY_SSSE3")
+target_include_directories(lumicut_options INTERFACE ${PROJECT_SOURCE_DIR})
+if(LUMICUT_SANITIZE)
+  target_compile_options(lumicut_options INTERFACE -fsanitize=${LUMICUT_SANITIZE} -fno-omit-frame-pointer -g)
+  target_link_options(lumicut_options INTERFACE -fsanitize=${LUMICUT_SANITIZE})
+endif()
+
+# lumicut_library(NAME SOURCES... LINK libs...): one folder, one static library, linked into the plug-in.
+function(lumicut_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  if(ARG_SOURCES)
+    add_library(${name} STATIC ${ARG_SOURCES})
+    target_link_libraries(${name} PUBLIC lumicut_options ${ARG_LINK})
+  else()
+    add_library(${name} INTERFACE)
+    target_link_libraries(${name} INTERFACE lumicut_options ${ARG_LINK})
+  endif()
+endfunction()
+
+# lumicut_test(NAME SOURCES... LINK libs... [ENVIRONMENT ...]): one GoogleTest program, one CTest entry.
+function(lumicut_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LINK;ENVIRONMENT" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE lumicut_options ${ARG_LINK} GTest::gtest GTest::gtest_main)
+  add_test(NAME ${name} COMMAND ${name})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 600)
+  endif()
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT}
+    ENVIRONMENT "LUMICUT_SOURCE_DIR=${PROJECT_SOURCE_DIR};LUMICUT_BINARY_DIR=${PROJECT_BINARY_DIR};${ARG_ENVIRONMENT}")
+endfunction()
