@@ -1,0 +1,337 @@
+/* Lumicut: many-lights global illumination for any host renderer. The whole C ABI. C99 and later, C++ too.
+ *
+ * Space     world is right-handed, metres (or any unit, used throughout); colour is linear Rec.709; angles are radians;
+ *           radiance W/(sr m2), intensity W/sr, irradiance W/m2. Matrices are row-major 3x4 affine maps (p' = M p).
+ * Growth    every descriptor starts with struct_size = sizeof(itself). Fields are only ever appended: missing ones take
+ *           their defaults (0 unless said), a non-zero unknown tail gives LUMICUT_UNSUPPORTED. An array of descriptors is
+ *           strided by the struct_size of its first element. `reserved` fields must be 0.
+ * Errors    functions return a lumicut_result; lumicut_last_error() then gives this thread's text, naming field and
+ *           value. A call that fails leaves its object as it was. Bad input never crashes; nothing is thrown.
+ * Memory    inputs are copied before the call returns, unless said. Outputs named "view" are borrowed: valid until the
+ *           next call on the object that is not [any]. Strings returned are borrowed in the same way.
+ * Handles   are counted: create gives one reference, lumicut_retain adds one, lumicut_release takes one (NULL is
+ *           allowed). An object keeps what it stands on alive: a render its scene, a scene its device.
+ * Threads   [any] call from any thread at any time; [object] the host serialises calls on one object; [shared] may run
+ *           concurrently with other [shared] calls on the same object.
+ * Callbacks return void and write their answer through a pointer that is preset to "nothing". They may be called from
+ *           any thread, concurrently. They must not call back into the object that calls them.                        */
+#ifndef LUMICUT_H
+#define LUMICUT_H
+
+#include <stdint.h>
+
+#if defined(LUMICUT_BUILDING)
+#define LUMICUT_API __attribute__((visibility("default")))
+#else
+#define LUMICUT_API
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define LUMICUT_ABI_MAJOR 1
+#define LUMICUT_ABI_MINOR 0
+
+typedef int32_t lumicut_result;
+enum {
+  LUMICUT_OK = 0, LUMICUT_INVALID_ARGUMENT = 1, LUMICUT_INVALID_STATE = 2, LUMICUT_UNSUPPORTED = 3,
+  LUMICUT_OUT_OF_MEMORY = 4, LUMICUT_CANCELLED = 5, LUMICUT_INTERNAL = 6
+};
+
+typedef struct lumicut_device_t* lumicut_device;
+typedef struct lumicut_accel_t* lumicut_accel;
+typedef struct lumicut_scene_t* lumicut_scene;
+typedef struct lumicut_integrator_t* lumicut_integrator;
+typedef struct lumicut_render_t* lumicut_render;
+
+/* ---- Library and devices ------------------------------------------------------------------------------------------ */
+
+LUMICUT_API const char* lumicut_version(uint32_t* abi_major, uint32_t* abi_minor); /* [any] "1.0.0"; either may be NULL */
+LUMICUT_API const char* lumicut_last_error(void); /* [any] this thread's last failure; "" if none */
+LUMICUT_API const void* lumicut_get_extension(const char* id); /* [any] table of an optional extension, NULL if absent */
+
+typedef struct lumicut_device_desc {
+  uint32_t struct_size;
+  uint32_t abi_major; /* LUMICUT_ABI_MAJOR of the host; another gives LUMICUT_UNSUPPORTED */
+  int32_t threads;    /* 0: all */
+  int32_t verbosity;  /* 0 errors, 1 warnings, 2 information, 3 debugging */
+  void (*log)(void* user, int32_t level, const char* text); /* NULL: silent */
+  void* user;
+} lumicut_device_desc;
+
+LUMICUT_API lumicut_result lumicut_device_create(const lumicut_device_desc* desc, lumicut_device* device); /* [any] */
+LUMICUT_API void lumicut_retain(void* handle);  /* [any] any handle */
+LUMICUT_API void lumicut_release(void* handle); /* [any] a running render is cancelled and waited for */
+
+typedef struct lumicut_status {
+  uint32_t struct_size;
+  int32_t state;       /* LUMICUT_IDLE ... */
+  const char* phase;   /* what runs now, such as "light tree"; static string */
+  double fraction;     /* of the phase, 0..1 */
+  double seconds;      /* since the work began */
+  uint64_t tiles_done; /* renders alone */
+  uint64_t tiles_total;
+} lumicut_status;
+enum { LUMICUT_IDLE = 0, LUMICUT_RUNNING = 1, LUMICUT_DONE = 2, LUMICUT_STOPPED = 3, LUMICUT_FAILED = 4 };
+
+/* Of accel, scene, integrator or render, while a call of it works in another thread. */
+LUMICUT_API lumicut_result lumicut_get_status(void* handle, lumicut_status* status); /* [any] */
+LUMICUT_API lumicut_result lumicut_cancel(void* handle); /* [any] what runs returns LUMICUT_CANCELLED soon; the object stays usable */
+LUMICUT_API const char* lumicut_stats_json(void* handle); /* [object] counters and seconds per phase of the last work */
+
+/* ---- Level 1, accel: rays against triangles or boxes. Ray and hit fields are Embree's, in Embree's order ---------- */
+
+typedef struct lumicut_ray {
+  float org_x, org_y, org_z, tnear, dir_x, dir_y, dir_z, time, tfar;
+  uint32_t mask, id, flags;
+} lumicut_ray;
+typedef struct lumicut_hit {
+  float ng_x, ng_y, ng_z, u, v;
+  uint32_t prim_id, geom_id, inst_id; /* geom_id is LUMICUT_NO_ID where nothing was hit */
+} lumicut_hit;
+typedef struct lumicut_rayhit {
+  lumicut_ray ray;
+  lumicut_hit hit;
+} lumicut_rayhit;
+#define LUMICUT_NO_ID 0xffffffffu
+
+typedef struct lumicut_accel_desc {
+  uint32_t struct_size;
+  uint32_t robust;         /* 1: watertight on shared edges */
+  const char* kind;        /* "agglomerative" (default) or "embree" */
+  const char* builder;     /* agglomerative alone: see docs/embree_dropin.md; NULL: the default */
+  const float* positions;  /* xyz */
+  uint64_t position_count;
+  uint64_t position_stride; /* bytes; 0: 12 */
+  const uint32_t* indices; /* three a triangle */
+  uint64_t triangle_count;
+  const float* boxes;      /* instead of triangles: six floats a box, lower and upper corner; rays hit the boxes themselves */
+  uint64_t box_count;
+} lumicut_accel_desc;
+
+typedef struct lumicut_accel_info {
+  uint32_t struct_size;
+  uint32_t node_count;    /* of the binary tree that lumicut_accel_node shows; 0: the kind does not show it */
+  uint64_t primitive_count, bytes;
+  double build_seconds;
+  double expected_boxes, expected_primitives, expected_cost; /* Walter et al. 2008, Fig. 6 */
+  float lower[3], upper[3];
+} lumicut_accel_info;
+
+typedef struct lumicut_accel_node_info {
+  uint32_t struct_size;
+  uint32_t left, right;    /* children; LUMICUT_NO_ID in a leaf. Node 0 is the root */
+  uint32_t first, count;   /* a leaf's primitives: lumicut_accel_primitive order */
+  float lower[3], upper[3];
+} lumicut_accel_node_info;
+
+LUMICUT_API lumicut_result lumicut_accel_build(lumicut_device device, const lumicut_accel_desc* desc, lumicut_accel* accel); /* [any] */
+LUMICUT_API lumicut_result lumicut_accel_get_info(lumicut_accel accel, lumicut_accel_info* info); /* [shared] */
+LUMICUT_API lumicut_result lumicut_accel_get_node(lumicut_accel accel, uint32_t index, lumicut_accel_node_info* node); /* [shared] */
+LUMICUT_API lumicut_result lumicut_accel_get_primitives(lumicut_accel accel, const uint32_t** ids, uint64_t* count); /* [shared] view: leaf order -> primitive */
+LUMICUT_API lumicut_result lumicut_accel_intersect(lumicut_accel accel, lumicut_rayhit* rays, uint64_t count); /* [shared] closest hits */
+LUMICUT_API lumicut_result lumicut_accel_occluded(lumicut_accel accel, lumicut_ray* rays, uint64_t count); /* [shared] tfar = -inf where hit */
+
+/* ---- Level 2, scenes ---------------------------------------------------------------------------------------------- */
+
+typedef struct lumicut_scene_desc {
+  uint32_t struct_size;
+  uint32_t robust;   /* 1: watertight tracing */
+  const char* accel; /* "embree" (default), "agglomerative"; the host's own with lumicut_scene_set_trace */
+} lumicut_scene_desc;
+
+typedef struct lumicut_texture {
+  uint32_t struct_size;
+  uint32_t width, height;
+  uint32_t channels; /* 1..4 */
+  uint32_t format;   /* LUMICUT_UINT8 (0..255 -> 0..1) or LUMICUT_FLOAT32 */
+  uint32_t flags;    /* LUMICUT_SRGB: decode; LUMICUT_CLAMP: no repeat; LUMICUT_NEAREST: no filter */
+  const void* pixels; /* row 0 is the top row (v = 1), rows packed */
+} lumicut_texture;
+enum { LUMICUT_UINT8 = 0, LUMICUT_FLOAT32 = 1 };
+enum { LUMICUT_SRGB = 1, LUMICUT_CLAMP = 2, LUMICUT_NEAREST = 4 };
+
+typedef struct lumicut_material {
+  uint32_t struct_size;
+  uint32_t flags;          /* LUMICUT_EMIT_BOTH_SIDES; LUMICUT_PHONG: the specular lobe is Phong's, else Blinn's */
+  float diffuse[3];        /* kd, 0..1 */
+  float shininess;         /* n, the lobe's exponent, >= 0 */
+  float specular[3];       /* ks, 0..1: Blinn ks (n+2)/2pi cos^n(beta); Phong ks/2pi cos^n(beta); see docs/scene_format.md */
+  float opacity;           /* 0: not given, taken as 1; below 0.5 a hole where there is no texture */
+  float emission[3];       /* radiance, on the side the geometric normal points to */
+  int32_t diffuse_texture, specular_texture, opacity_texture, emission_texture; /* 1 + index into the textures; 0: none. Factors multiply */
+} lumicut_material;
+enum { LUMICUT_EMIT_BOTH_SIDES = 1, LUMICUT_PHONG = 2 };
+
+typedef struct lumicut_mesh {
+  uint32_t struct_size;
+  uint32_t mask;              /* seen by rays with (mask & ray mask) != 0; 0: all */
+  const float* positions;     /* xyz */
+  const float* normals;       /* xyz a vertex, for shading; NULL: flat */
+  const float* uvs;           /* uv a vertex; NULL: 0 */
+  uint64_t vertex_count;
+  const uint32_t* indices;    /* three a triangle, counter-clockwise seen from the front */
+  uint64_t triangle_count;
+  const uint32_t* materials;  /* index a triangle; NULL: `material` for all */
+  const float* transforms;    /* one 3x4 an instance; NULL: one instance, as it is */
+  uint64_t transform_count;
+  uint32_t material;
+  uint32_t group;             /* light group of what it emits, 0..2^16-1 */
+} lumicut_mesh;
+
+typedef struct lumicut_light {
+  uint32_t struct_size;
+  uint32_t type;      /* LUMICUT_POINT ... Lights are not seen by the camera and block nothing: an emissive mesh does */
+  uint32_t unit;      /* LUMICUT_RADIOMETRIC: value is intensity (point, spot), radiance (rectangle, disk), irradiance on a
+                         surface facing it (sun); LUMICUT_WATT: power as Blender's lamps have it (sun: irradiance) */
+  uint32_t group;     /* light group, 0..2^16-1 */
+  float color[3];     /* multiplies value */
+  float value;
+  float position[3];  /* centre; not for suns */
+  float radius;       /* point, spot: 0, or the radius of a sphere that emits evenly; sun: angular radius */
+  float direction[3]; /* spot: axis of the cone; sun: the way light travels; rectangle, disk: unused */
+  float angle;        /* spot: full opening angle */
+  float u[3];         /* rectangle: whole edges; disk (ellipse): whole axes. Emits towards u x v, not from behind */
+  float blend;        /* spot: 0 sharp .. 1 soft edge */
+  float v[3];
+  float spread;       /* rectangle, disk: opening angle, pi (default, also 0) is Lambertian */
+  uint32_t spot_cosine; /* 1: intensity also falls with the cosine to the axis (Blender before 4.0) */
+} lumicut_light;
+enum { LUMICUT_POINT = 0, LUMICUT_SPOT = 1, LUMICUT_RECTANGLE = 2, LUMICUT_DISK = 3, LUMICUT_SUN = 4 };
+enum { LUMICUT_RADIOMETRIC = 0, LUMICUT_WATT = 1 };
+
+typedef struct lumicut_environment {
+  uint32_t struct_size;
+  uint32_t group;
+  float color[3];       /* radiance, multiplies the texture */
+  int32_t texture;      /* 1 + index, latitude-longitude; 0: constant */
+  float world_to_map[9]; /* row-major rotation; all 0: identity. In map space z is up: u = 1/2 - atan2(y,x)/2pi,
+                            v = 1/2 + atan2(z,hypot(x,y))/pi */
+} lumicut_environment;
+
+typedef struct lumicut_camera {
+  uint32_t struct_size;
+  uint32_t orthographic;
+  float to_world[12];   /* looks along -z, +y up, +x right; scale is ignored */
+  float fov_y;          /* perspective: vertical opening angle of the whole image */
+  float height;         /* orthographic: height of the image in the world */
+  float shift[2];       /* lens shift, in image heights, right and up */
+  float near_clip, far_clip; /* along the ray's forward axis; far 0: infinity */
+  float pixel_aspect;   /* width/height of a pixel; 0: 1 */
+  float lens_radius;    /* depth of field; 0: pinhole */
+  float focus_distance; /* along the forward axis */
+} lumicut_camera;
+
+/* The host's own tracer, in batches: fill hits (closest) / set tfar = -inf (occluded). geom_id is the mesh's id, inst_id the
+   index of its transform. */
+typedef struct lumicut_trace {
+  uint32_t struct_size;
+  uint32_t batch; /* most rays a call; 0: 65536 */
+  void (*intersect)(void* user, lumicut_rayhit* rays, uint64_t count);
+  void (*occluded)(void* user, lumicut_ray* rays, uint64_t count);
+  void* user;
+} lumicut_trace;
+
+LUMICUT_API lumicut_result lumicut_scene_create(lumicut_device device, const lumicut_scene_desc* desc, lumicut_scene* scene); /* [any] */
+/* All setters are [object], replace what was set, and take effect at the next commit. */
+LUMICUT_API lumicut_result lumicut_scene_set_textures(lumicut_scene scene, const lumicut_texture* textures, uint64_t count);
+LUMICUT_API lumicut_result lumicut_scene_set_materials(lumicut_scene scene, const lumicut_material* materials, uint64_t count);
+LUMICUT_API lumicut_result lumicut_scene_add_mesh(lumicut_scene scene, const lumicut_mesh* mesh, uint32_t* id);
+/* New positions of the same topology (and normals, or NULL), new transforms (count as before, or NULL: unchanged). */
+LUMICUT_API lumicut_result lumicut_scene_update_mesh(lumicut_scene scene, uint32_t id, const float* positions, const float* normals, const float* transforms);
+LUMICUT_API lumicut_result lumicut_scene_set_lights(lumicut_scene scene, const lumicut_light* lights, uint64_t count);
+LUMICUT_API lumicut_result lumicut_scene_set_environment(lumicut_scene scene, const lumicut_environment* environment); /* NULL: black */
+LUMICUT_API lumicut_result lumicut_scene_set_camera(lumicut_scene scene, const lumicut_camera* camera);
+LUMICUT_API lumicut_result lumicut_scene_set_trace(lumicut_scene scene, const lumicut_trace* trace); /* NULL: ours again */
+LUMICUT_API lumicut_result lumicut_scene_commit(lumicut_scene scene); /* [object] builds; refused while a render uses the scene */
+
+/* ---- Level 3, integrators ----------------------------------------------------------------------------------------- */
+
+typedef struct lumicut_integrator_info {
+  uint32_t struct_size;
+  uint32_t param_count;
+  const char *id, *label, *description, *source; /* source: the paper */
+} lumicut_integrator_info;
+
+typedef struct lumicut_param_info {
+  uint32_t struct_size;
+  uint32_t type; /* LUMICUT_FLOAT ... */
+  const char *id, *label, *description, *unit;
+  const char* choices;      /* LUMICUT_CHOICE: names separated by '|'; else "" */
+  const char* default_text; /* as lumicut_integrator_set takes it */
+  double minimum, maximum;  /* of numbers */
+} lumicut_param_info;
+enum { LUMICUT_FLOAT = 0, LUMICUT_INT = 1, LUMICUT_BOOL = 2, LUMICUT_CHOICE = 3 };
+
+LUMICUT_API lumicut_result lumicut_get_integrator_info(uint32_t index, lumicut_integrator_info* info); /* [any] INVALID_ARGUMENT past the last */
+LUMICUT_API lumicut_result lumicut_get_param_info(const char* integrator, uint32_t index, lumicut_param_info* info); /* [any] */
+LUMICUT_API lumicut_result lumicut_integrator_create(lumicut_device device, const char* id, lumicut_integrator* integrator); /* [any] */
+LUMICUT_API lumicut_result lumicut_integrator_set(lumicut_integrator integrator, const char* name, const char* value); /* [object] */
+LUMICUT_API const char* lumicut_integrator_get(lumicut_integrator integrator, const char* name); /* [object] NULL: no such parameter */
+
+typedef struct lumicut_vpl {
+  float position[3];  /* directional: unused */
+  uint32_t kind;      /* LUMICUT_VPL_OMNI ... */
+  float normal[3];    /* unit; oriented: I falls with max(0, cos); directional: the way light travels; spot: axis */
+  uint32_t group;     /* light group it came from */
+  float intensity[3]; /* W/sr along the normal; directional: irradiance, W/m2 */
+  float cos_outer;    /* spot: falls to 0 at this cosine */
+  float blend;        /* spot: smoothstep over this much of cosine */
+  float spot_cosine;  /* spot: 1: times the cosine too */
+  float reserved[2];
+} lumicut_vpl;
+enum { LUMICUT_VPL_OMNI = 0, LUMICUT_VPL_ORIENTED = 1, LUMICUT_VPL_DIRECTIONAL = 2, LUMICUT_VPL_SPOT = 3 };
+
+/* The host's own VPLs, instead of those traced from the scene; count 0: trace again. */
+LUMICUT_API lumicut_result lumicut_integrator_set_lights(lumicut_integrator integrator, const lumicut_vpl* lights, uint64_t count); /* [object] */
+LUMICUT_API lumicut_result lumicut_integrator_prepare(lumicut_integrator integrator, lumicut_scene scene); /* [object] traces VPLs, builds trees; keeps the scene */
+LUMICUT_API lumicut_result lumicut_integrator_get_lights(lumicut_integrator integrator, const lumicut_vpl** lights, uint64_t* count); /* [object] view, after prepare */
+
+typedef struct lumicut_point { /* a surface point of the host's, 64 bytes */
+  float position[3];
+  uint32_t material;         /* of the scene */
+  float normal[3];           /* shading normal, unit */
+  float u;
+  float geometric_normal[3]; /* unit */
+  float v;
+  float to_viewer[3];        /* unit */
+  uint32_t pixel;            /* points of one pixel lie together; methods that share work within a pixel use it */
+} lumicut_point;
+
+/* Reflected radiance towards the viewer, three floats a point. A pure function of the seed and the input. */
+LUMICUT_API lumicut_result lumicut_integrator_shade(lumicut_integrator integrator, const lumicut_point* points, uint64_t count, float* radiance); /* [shared] after prepare */
+
+/* ---- Level 4, whole frames ---------------------------------------------------------------------------------------- */
+
+typedef struct lumicut_render_desc {
+  uint32_t struct_size;
+  uint32_t width, height;
+  uint32_t samples;   /* a pixel; 0: 1. One sample lies at the pixel's centre */
+  uint32_t crop[4];   /* x0, y0, x1, y1, row 0 on top; all 0: the whole */
+  uint32_t tile_size; /* 0: 64 */
+} lumicut_render_desc;
+
+typedef struct lumicut_tile {
+  uint32_t struct_size;
+  uint32_t x0, y0, x1, y1;
+} lumicut_tile;
+
+typedef struct lumicut_channel_info {
+  uint32_t struct_size;
+  uint32_t components; /* 1 or 3 */
+  const char *name, *description;
+} lumicut_channel_info;
+
+LUMICUT_API lumicut_result lumicut_get_channel_info(uint32_t index, lumicut_channel_info* info); /* [any] "radiance", "alpha", "depth" ... */
+/* Starts in the background: prepares the integrator if need be, renders. Integrator and scene may not change meanwhile. */
+LUMICUT_API lumicut_result lumicut_render_start(lumicut_integrator integrator, lumicut_scene scene, const lumicut_render_desc* desc, lumicut_render* render); /* [object] both */
+LUMICUT_API lumicut_result lumicut_render_wait(lumicut_render render, uint32_t milliseconds, lumicut_status* status); /* [any] returns when done or after that time; a failed render's error comes back here */
+LUMICUT_API lumicut_result lumicut_render_next_tile(lumicut_render render, lumicut_tile* tile); /* [object] finished tiles, each once; x1 = 0: none now */
+LUMICUT_API lumicut_result lumicut_render_read(lumicut_render render, const char* channel, const lumicut_tile* rect, float* out); /* [any] rect NULL: the crop; rows packed from the top */
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* LUMICUT_H */
