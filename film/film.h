@@ -1,0 +1,53 @@
+// The film: named planes of floats over the crop, row 0 on top.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/vec.h"
+
+namespace lumicut {
+
+enum class Channel : uint32_t { radiance, alpha, depth, normal, albedo, position, cut_size, rays, bounds };
+
+struct ChannelInfo {
+  Channel channel;
+  const char* name;
+  uint32_t components;
+  const char* description;
+};
+// All channels, in the order of the enum.
+std::span<const ChannelInfo> channel_table();
+
+struct Rect {
+  uint32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  uint32_t width() const { return x1 - x0; }
+  uint32_t height() const { return y1 - y0; }
+  bool operator==(const Rect&) const = default;
+};
+
+class Film {
+ public:
+  explicit Film(Rect crop);
+  const Rect& crop() const { return crop_; }
+  // Pixel in image coordinates; components as in channel_table.
+  float* pixel(Channel channel, uint32_t x, uint32_t y) {
+    const auto c = static_cast<size_t>(channel);
+    return planes_[c].data() + (static_cast<size_t>(y - crop_.y0) * crop_.width() + (x - crop_.x0)) * channel_table()[c].components;
+  }
+  void set(Channel channel, uint32_t x, uint32_t y, const Rgb& v) {
+    float* p = pixel(channel, x, y);
+    p[0] = v.x, p[1] = v.y, p[2] = v.z;
+  }
+  void set(Channel channel, uint32_t x, uint32_t y, float v) { *pixel(channel, x, y) = v; }
+  // Copies a rectangle inside the crop, rows packed. `out` holds width·height·components floats.
+  void read(Channel channel, const Rect& rect, float* out) const;
+
+ private:
+  Rect crop_;
+  std::vector<float> planes_[9];
+};
+
+}  // namespace lumicut

@@ -1,0 +1,25 @@
+// Whole frames: camera rays → points → integrator → film, in batches, so that memory does not grow with resolution.
+#pragma once
+
+#include <functional>
+
+#include "film/film.h"
+#include "integrators/integrator.h"
+
+namespace lumicut {
+
+struct FrameOptions {
+  uint32_t width = 0, height = 0, samples = 1, tile_size = 64;
+  Rect crop;  // inside width × height
+  uint64_t seed = 1;
+};
+
+// Tiles of the crop in the order they are rendered.
+std::vector<Rect> frame_tiles(const FrameOptions& options);
+
+// Renders into `film` (whose crop is options.crop). `tile_done` is called from any thread, once a tile, after its pixels
+// are written. Throws Error(cancelled).
+void render_frame(const Scene& scene, const Integrator& integrator, const FrameOptions& options, Film& film,
+                  ShadeContext context, const std::function<void(const Rect&)>& tile_done);
+
+}  // namespace lumicut

@@ -1,0 +1,35 @@
+// Lamps. They are not seen by the camera and block nothing; an emissive mesh is and does.
+#pragma once
+
+#include <cstdint>
+
+#include "core/vec.h"
+
+namespace lumicut {
+
+enum class LightType : uint32_t { point = 0, spot = 1, rectangle = 2, disk = 3, sun = 4 };
+
+// Radiometric values inside: what the host gave in watt is converted once. [docs/units.md]
+struct Light {
+  LightType type = LightType::point;
+  uint32_t group = 0;
+  Rgb value{};  // intensity W/sr (point, spot: on the axis), radiance W/(sr·m²) (rectangle, disk), irradiance W/m² (sun)
+  Vec3f position{};
+  float radius = 0.0f;         // point, spot: emitting sphere; sun: angular radius, radians
+  Vec3f direction{0, 0, -1};   // unit; spot: axis; sun: the way light travels
+  float cos_outer = 0.0f;      // spot: cosine of half the opening angle
+  float blend_cosine = 0.0f;   // spot: smoothstep over this much of cosine; 0: sharp
+  bool spot_cosine = false;
+  Vec3f u{}, v{};              // rectangle: whole edges; disk: whole axes; emits towards u×v
+  float spread = 3.14159265f;  // rectangle, disk: opening angle; π: Lambertian
+};
+
+struct Environment {
+  Rgb color{};
+  int32_t texture = -1;
+  uint32_t group = 0;
+  float world_to_map[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  bool black() const { return !(max_component(color) > 0.0f); }
+};
+
+}  // namespace lumicut

@@ -1,0 +1,131 @@
+// What is rendered: meshes, materials, textures, lamps, environment, camera, and the accel that traces rays in it.
+// Setters keep the host's data; `commit` checks it as a whole and builds. After commit all queries are [shared].
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "accel/accel.h"
+#include "scene/camera.h"
+#include "scene/light.h"
+#include "scene/material.h"
+#include "scene/shade_points.h"
+#include "scene/texture.h"
+
+namespace lumicut {
+
+struct Mesh {
+  std::vector<Vec3f> positions;
+  std::vector<Vec3f> normals;  // empty: flat
+  std::vector<Vec2f> uvs;      // empty: 0
+  std::vector<uint32_t> indices;
+  std::vector<uint32_t> triangle_materials;  // empty: `material` for all
+  std::vector<Transform> instances;          // empty: one, as it is
+  uint32_t material = 0;
+  uint32_t mask = 0xffffffffu;
+  uint32_t group = 0;
+
+  size_t triangle_count() const { return indices.size() / 3; }
+  uint32_t material_of(uint32_t triangle) const {
+    return triangle_materials.empty() ? material : triangle_materials[triangle];
+  }
+};
+
+// A hit made whole: world space.
+struct SurfaceHit {
+  Vec3f position;          // on the surface
+  Vec3f geometric_normal;  // unit, the mesh's front side
+  Vec3f normal;            // unit shading normal, on the geometric normal's side
+  Vec2f uv;
+  uint32_t material = 0, mesh = 0, triangle = 0;
+  float t = 0.0f;
+};
+
+class Scene final : private HitFilter {
+ public:
+  struct Config {
+    std::string accel = "embree";
+    bool robust = true;
+  };
+  // Makes the host's own tracer over this scene's geometry (accel/host_accel.h).
+  using AccelFactory = std::function<std::unique_ptr<Accel>(const AccelGeometry&)>;
+
+  explicit Scene(Config config) : config_(std::move(config)) {}
+  Scene(const Scene&) = delete;
+  Scene& operator=(const Scene&) = delete;
+
+  void set_textures(std::vector<Texture> textures);
+  void set_materials(std::vector<Material> materials);
+  // Returns the mesh's id. Throws on indices out of range, non-finite positions or transforms, arrays of wrong length.
+  uint32_t add_mesh(Mesh mesh);
+  // Empty vectors: unchanged. Counts must be as before.
+  void update_mesh(uint32_t id, std::vector<Vec3f> positions, std::vector<Vec3f> normals, std::vector<Transform> instances);
+  void set_lights(std::vector<Light> lights);
+  void set_environment(const Environment& environment);
+  void set_camera(const Camera& camera);
+  void set_trace(AccelFactory factory);  // empty: ours again
+
+  // Checks references between the parts (naming what is wrong), builds the accel. On failure the last commit stands.
+  void commit(Progress& progress);
+  bool committed() const { return committed_; }
+  // Rises with each commit: integrators prepared against an older one prepare again.
+  uint64_t version() const { return version_; }
+
+  const Accel& accel() const { return *accel_; }
+  const std::vector<Mesh>& meshes() const { return meshes_; }
+  const std::vector<Material>& materials() const { return materials_; }
+  const std::vector<Texture>& textures() const { return textures_; }
+  const std::vector<Light>& lights() const { return lights_; }
+  const Environment& environment() const { return environment_; }
+  const Camera& camera() const { return camera_; }
+  bool has_camera() const { return has_camera_; }
+  // World bounds of all instances; empty without geometry.
+  const Aabb& bounds() const { return bounds_; }
+  // Half the diagonal of the bounds; 1 without geometry.
+  float radius() const { return radius_; }
+  // How far ray ends stand off surfaces: relative to the scene and to the largest coordinate's rounding.
+  float epsilon() const { return epsilon_; }
+
+  size_t instance_count(uint32_t mesh) const { return std::max<size_t>(1, meshes_[mesh].instances.size()); }
+  const Transform& instance(uint32_t mesh, uint32_t index) const;
+
+  // Makes a hit of `accel()` whole.
+  SurfaceHit surface(const RayHit& hit) const;
+  // The point to shade at a surface seen from direction `to_viewer` (unit, away from the surface).
+  SurfacePoint shade_point(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const;
+  // The same for a host's own point. `material` must be in range (checked by the caller).
+  SurfacePoint shade_point(const Vec3f& position, const Vec3f& geometric_normal, const Vec3f& normal, Vec2f uv,
+                           uint32_t material, const Vec3f& to_viewer, uint32_t pixel) const;
+  Rgb diffuse_color(uint32_t material, Vec2f uv) const;
+  Rgb specular_color(uint32_t material, Vec2f uv) const;
+  // Radiance emitted by a surface towards `to_viewer`.
+  Rgb emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const;
+  // Radiance of the environment seen along `direction` (unit).
+  Rgb environment_radiance(const Vec3f& direction) const;
+
+ private:
+  bool passes(uint32_t mesh, uint32_t prim, float u, float v) const override;
+  void check_references() const;
+
+  Config config_;
+  std::vector<Texture> textures_;
+  std::vector<Material> materials_;
+  std::vector<Mesh> meshes_;
+  std::vector<Light> lights_;
+  Environment environment_;
+  Camera camera_;
+  bool has_camera_ = false;
+  AccelFactory trace_;
+  std::unique_ptr<Accel> accel_;
+  std::vector<uint32_t> first_instance_;  // of each mesh, in AccelGeometry::instances
+  std::vector<uint32_t> instance_mesh_;
+  bool instanced_ = false;
+  bool committed_ = false;
+  uint64_t version_ = 0;
+  Aabb bounds_;
+  float radius_ = 1.0f, epsilon_ = 1e-6f;
+};
+
+}  // namespace lumicut

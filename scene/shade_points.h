@@ -1,0 +1,48 @@
+// Points to shade, structure of arrays: what the hot loops read, one array a field, padded to kLanes.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/aabb.h"
+
+namespace lumicut {
+
+// Widest SIMD vector in floats; arrays are padded to it, so that loops need no tail.
+inline constexpr size_t kLanes = 16;
+inline constexpr size_t round_up_to_lanes(size_t n) { return (n + kLanes - 1) / kLanes * kLanes; }
+
+// A surface seen from one side: the shading normal is turned to the viewer.
+struct SurfacePoint {
+  Vec3f position;  // offset from the surface by the scene's epsilon: shadow rays start here
+  Vec3f normal;    // unit, on the viewer's side
+  Vec3f mirror;    // unit: the view direction mirrored about `normal`
+  Rgb diffuse;     // kd/π
+  Rgb specular;    // ks · lobe_scale: radiance factor is specular·cosⁿβ·cosθ
+  float shininess = 0.0f;
+  uint32_t pixel = 0;  // points of one pixel lie together
+};
+
+struct ShadePoints {
+  // position, normal, mirror, diffuse, specular: [component][point]
+  std::vector<float> position[3], normal[3], mirror[3], diffuse[3], specular[3], shininess;
+  std::vector<uint32_t> pixel;
+
+  size_t size() const { return size_; }
+  // True where any point has a glossy lobe; loops skip it otherwise.
+  bool glossy() const { return glossy_; }
+  void clear();
+  void reserve(size_t n);
+  void push(const SurfacePoint& p);
+  // Pads every array to a multiple of kLanes with copies of the last point. Call once, after the last push.
+  void finish();
+  SurfacePoint get(size_t i) const;
+  Vec3f position_at(size_t i) const { return {position[0][i], position[1][i], position[2][i]}; }
+  Vec3f normal_at(size_t i) const { return {normal[0][i], normal[1][i], normal[2][i]}; }
+
+ private:
+  size_t size_ = 0;
+  bool glossy_ = false;
+};
+
+}  // namespace lumicut

@@ -1,0 +1,49 @@
+// Images on surfaces and around the scene. Texels are kept as the host gave them (bytes stay bytes).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/vec.h"
+
+namespace lumicut {
+
+class Texture {
+ public:
+  enum class Format { uint8, float32 };
+  struct Options {
+    bool srgb = false;     // decode colour channels (never alpha) from sRGB
+    bool clamp = false;    // else repeat
+    bool nearest = false;  // else bilinear
+  };
+
+  // `pixels`: height rows of width texels of `channels` (1..4) values, packed, row 0 on top (v = 1). Copied.
+  // Throws Error naming the bad value.
+  Texture(uint32_t width, uint32_t height, uint32_t channels, Format format, Options options, const void* pixels);
+
+  // Linear colour at (u, v), v upwards; one channel is grey, two are grey and alpha. Never NaN.
+  Rgb color(float u, float v) const;
+  // The opacity mask's value: the only channel, the alpha of two or four, the mean of three.
+  float mask(float u, float v) const;
+
+  uint32_t width() const { return width_; }
+  uint32_t height() const { return height_; }
+  // Linear colour of one texel, row 0 on top.
+  Rgb texel(uint32_t x, uint32_t y) const;
+  // Mean linear colour.
+  Rgb average() const;
+  bool has_alpha() const { return channels_ == 2 || channels_ == 4; }
+
+ private:
+  float value(uint32_t x, uint32_t y, uint32_t channel) const;
+  template <typename Fetch>
+  auto filter(float u, float v, Fetch fetch) const;
+
+  uint32_t width_, height_, channels_;
+  Format format_;
+  Options options_;
+  std::vector<uint8_t> bytes_;
+  std::vector<float> floats_;
+};
+
+}  // namespace lumicut

@@ -1,0 +1,21 @@
+// Light tracing: lamps, emissive meshes and environment → VPLs. [Keller 1997; Walter et al. 2005 sec. 5]
+#pragma once
+
+#include "core/parallel.h"
+#include "core/progress.h"
+#include "scene/scene.h"
+#include "vpl/vpl.h"
+
+namespace lumicut {
+
+struct VplOptions {
+  uint32_t count = 60000;         // wanted lights in all; what comes is within a few percent
+  float direct_share = 0.25f;     // of them on extended emitters, for their direct light (point, spot and sun lamps take one each)
+  uint32_t max_depth = 8;         // surfaces a light path may meet
+  uint64_t seed = 1;
+};
+
+// Energy is normalised by the number of light paths. Deterministic. A scene without emitters gives no lights.
+VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progress);
+
+}  // namespace lumicut
