@@ -20,7 +20,7 @@ inline constexpr uint32_t kNoId = 0xffffffffu;
 // Fields in Embree's order (RTCRay). `dir` need not be a unit vector; distances are in units of its length.
 struct Ray {
   Vec3f org;
-  float tnear = 0.0f;
+  float tnear = 0.0f;  // below 0 is taken as 0
   Vec3f dir;
   float time = 0.0f;
   float tfar = std::numeric_limits<float>::infinity();  // shortened to the hit; -inf when found occluded

@@ -1,0 +1,265 @@
+#include "accel/embree_accel.h"
+
+#include <atomic>
+#include <chrono>
+#include <cstring>
+#include <mutex>
+
+#include "accel/embree_api.h"
+#include "accel/validate.h"
+#include "core/error.h"
+
+namespace lumicut {
+namespace {
+
+static_assert(sizeof(Ray) == sizeof(RTCRay) && offsetof(Ray, tfar) == offsetof(RTCRay, tfar));
+static_assert(sizeof(Hit) == sizeof(RTCHit) && offsetof(Hit, inst) == offsetof(RTCHit, instID));
+
+// What Embree reports while it builds, from any of its threads.
+struct DeviceState {
+  std::mutex mutex;
+  RTCError code = RTC_ERROR_NONE;
+  std::string text;
+  std::atomic<int64_t> bytes{0};
+  Progress* progress = nullptr;
+};
+
+void on_error(void* user, RTCError code, const char* text) {
+  auto& state = *static_cast<DeviceState*>(user);
+  const std::lock_guard lock(state.mutex);
+  if (state.code != RTC_ERROR_NONE) return;
+  state.code = code;
+  state.text = text != nullptr ? text : "";
+}
+
+bool on_memory(void* user, ssize_t bytes, bool) {
+  static_cast<DeviceState*>(user)->bytes.fetch_add(bytes, std::memory_order_relaxed);
+  return true;
+}
+
+// Returning false stops the build.
+bool on_progress(void* user, double) {
+  const auto& state = *static_cast<DeviceState*>(user);
+  return state.progress == nullptr || !state.progress->cancelled();
+}
+
+struct FilterUser {
+  const HitFilter* filter = nullptr;
+  uint32_t mesh = 0;
+};
+
+// Embree asks for one ray or for a packet of them.
+void on_filter(const RTCFilterFunctionNArguments* args) {
+  const auto& user = *static_cast<const FilterUser*>(args->geometryUserPtr);
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (args->valid[i] == 0) continue;
+    if (user.filter->passes(user.mesh, RTCHitN_primID(args->hit, args->N, i), RTCHitN_u(args->hit, args->N, i),
+                            RTCHitN_v(args->hit, args->N, i)))
+      args->valid[i] = 0;
+  }
+}
+
+class EmbreeAccel final : public Accel {
+ public:
+  EmbreeAccel(const AccelGeometry& geometry, const AccelOptions& options, Progress* progress) {
+    const auto start = std::chrono::steady_clock::now();
+    state_.progress = progress;
+    // No threads of Embree's own: the build joins the caller's arena.
+    device_ = rtcNewDevice("start_threads=0,set_affinity=0");
+    if (device_ == nullptr) throw Error(ErrorCode::internal, "embree: no device can be made here");
+    rtcSetDeviceErrorFunction(device_, on_error, &state_);
+    rtcSetDeviceMemoryMonitorFunction(device_, on_memory, &state_);
+    try {
+      build(geometry, options);
+    } catch (...) {
+      release();
+      throw;
+    }
+    state_.progress = nullptr;
+    info_.build_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+  ~EmbreeAccel() override { release(); }
+  EmbreeAccel(const EmbreeAccel&) = delete;
+  EmbreeAccel& operator=(const EmbreeAccel&) = delete;
+
+  AccelInfo info() const override { return info_; }
+
+  void intersect(std::span<RayHit> rays) const override {
+    embree::Context context(false);
+    RTCRayHit local;  // Embree wants 16-byte alignment, which a host's array need not have
+    for (RayHit& r : rays) {
+      r.hit = {};
+      if (!is_traceable(r.ray)) continue;
+      std::memcpy(&local, &r, sizeof(local));
+      local.ray.tnear = std::max(local.ray.tnear, 0.0f);
+      context.intersect(scene_, &local);
+      local.ray.tnear = r.ray.tnear;
+      if (local.hit.geomID != RTC_INVALID_GEOMETRY_ID) std::memcpy(static_cast<void*>(&r), &local, sizeof(local));
+    }
+  }
+
+  void occluded(std::span<Ray> rays) const override {
+    embree::Context context(false);
+    RTCRay local;
+    for (Ray& r : rays) {
+      if (!is_traceable(r)) continue;
+      std::memcpy(&local, &r, sizeof(local));
+      local.tnear = std::max(local.tnear, 0.0f);
+      context.occluded(scene_, &local);
+      r.tfar = local.tfar;
+    }
+  }
+
+  void occluded_from_point(const Vec3f& light, bool directional, const float* px, const float* py, const float* pz,
+                           size_t n, uint8_t* out) const override {
+    embree::Context context(true);
+    constexpr size_t kChunk = embree::kHasStreams ? 64 : 16;
+    for (size_t begin = 0; begin < n; begin += kChunk) {
+      const size_t count = std::min(kChunk, n - begin);
+      Packet<kChunk> packet;
+      for (size_t i = 0; i < kChunk; ++i) {
+        const size_t at = begin + std::min(i, count - 1);
+        const Vec3f p{px[at], py[at], pz[at]};
+        const Vec3f org = directional ? p : light, dir = directional ? light : p - light;
+        const float sum = (org.x + org.y + org.z) * 0.0f + (dir.x + dir.y + dir.z) * 0.0f;
+        const bool active = i < count && sum == 0.0f;
+        packet.org_x[i] = org.x, packet.org_y[i] = org.y, packet.org_z[i] = org.z;
+        packet.dir_x[i] = active ? dir.x : 1.0f, packet.dir_y[i] = active ? dir.y : 0.0f,
+        packet.dir_z[i] = active ? dir.z : 0.0f;
+        packet.tnear[i] = active ? 0.0f : std::numeric_limits<float>::infinity();
+        packet.tfar[i] = !active ? -std::numeric_limits<float>::infinity()
+                                 : (directional ? std::numeric_limits<float>::infinity() : 0x1.fffffep-1f);
+        packet.time[i] = 0.0f;
+        packet.mask[i] = 0xffffffffu, packet.id[i] = 0, packet.flags[i] = 0;
+        packet.valid[i] = active ? -1 : 0;
+      }
+      if constexpr (embree::kHasStreams)
+        context.occluded_stream(scene_, reinterpret_cast<RTCRayN*>(packet.org_x), kChunk, 12 * kChunk * sizeof(float));
+      else
+        context.occluded16(packet.valid, scene_, reinterpret_cast<RTCRay16*>(packet.org_x));
+      for (size_t i = 0; i < count; ++i)
+        out[begin + i] = packet.valid[i] != 0 && packet.tfar[i] == -std::numeric_limits<float>::infinity();
+    }
+  }
+
+ private:
+  // RTCRayN: twelve arrays in RTCRay's order.
+  template <size_t N>
+  struct alignas(64) Packet {
+    float org_x[N], org_y[N], org_z[N], tnear[N], dir_x[N], dir_y[N], dir_z[N], time[N], tfar[N];
+    uint32_t mask[N], id[N], flags[N];
+    int valid[N];
+  };
+
+  void check() const {
+    if (state_.code == RTC_ERROR_NONE) return;
+    if (state_.code == RTC_ERROR_CANCELLED) throw Error(ErrorCode::cancelled, "cancelled");
+    const bool memory = state_.code == RTC_ERROR_OUT_OF_MEMORY;
+    throw Error(memory ? ErrorCode::out_of_memory : ErrorCode::internal, "embree: " + state_.text);
+  }
+
+  RTCScene new_scene(const AccelOptions& options) {
+    const RTCScene scene = rtcNewScene(device_);
+    check();
+    scenes_.push_back(scene);
+    rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
+    rtcSetSceneFlags(scene, options.robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+    rtcSetSceneProgressMonitorFunction(scene, on_progress, &state_);
+    return scene;
+  }
+
+  void commit(RTCScene scene) {
+    if (state_.progress != nullptr) state_.progress->check();
+    rtcCommitScene(scene);
+    check();
+    rtcSetSceneProgressMonitorFunction(scene, nullptr, nullptr);
+  }
+
+  void add_mesh(RTCScene scene, const AccelGeometry& geometry, uint32_t id) {
+    const MeshView& mesh = geometry.meshes[id];
+    if (mesh.triangle_count == 0) return;
+    const RTCGeometry geom = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+    check();
+    // Copied: Embree reads 16 bytes at the last position, past the end of a caller's array.
+    void* positions =
+        rtcSetNewGeometryBuffer(geom, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), mesh.position_count);
+    if (positions != nullptr) std::memcpy(positions, mesh.positions, mesh.position_count * sizeof(Vec3f));
+    rtcSetSharedGeometryBuffer(geom, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.indices, 0, 3 * sizeof(uint32_t),
+                               mesh.triangle_count);
+    rtcSetGeometryMask(geom, mesh.mask);
+    if (mesh.has_cutout && geometry.filter != nullptr) {
+      rtcSetGeometryUserData(geom, &filters_[id]);
+      rtcSetGeometryIntersectFilterFunction(geom, on_filter);
+      rtcSetGeometryOccludedFilterFunction(geom, on_filter);
+    }
+    rtcCommitGeometry(geom);
+    rtcAttachGeometryByID(scene, geom, id);
+    rtcReleaseGeometry(geom);
+    check();
+  }
+
+  void build(const AccelGeometry& geometry, const AccelOptions& options) {
+    filters_.resize(geometry.meshes.size());
+    for (uint32_t m = 0; m < filters_.size(); ++m) filters_[m] = {geometry.filter, m};
+    scene_ = new_scene(options);
+    if (geometry.instances.empty()) {
+      for (uint32_t m = 0; m < geometry.meshes.size(); ++m) {
+        add_mesh(scene_, geometry, m);
+        info_.triangles += geometry.meshes[m].triangle_count;
+      }
+    } else {
+      std::vector<RTCScene> inner(geometry.meshes.size(), nullptr);
+      for (uint32_t i = 0; i < geometry.instances.size(); ++i) {
+        const InstanceView& instance = geometry.instances[i];
+        Transform inverse;
+        if (geometry.meshes[instance.mesh].triangle_count == 0 || !invert(instance.to_world, inverse)) continue;
+        if (inner[instance.mesh] == nullptr) {
+          inner[instance.mesh] = new_scene(options);
+          add_mesh(inner[instance.mesh], geometry, instance.mesh);
+          commit(inner[instance.mesh]);
+          info_.triangles += geometry.meshes[instance.mesh].triangle_count;
+        }
+        const RTCGeometry geom = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
+        check();
+        rtcSetGeometryInstancedScene(geom, inner[instance.mesh]);
+        rtcSetGeometryTransform(geom, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, instance.to_world.m);
+        rtcSetGeometryMask(geom, 0xffffffffu);  // the mesh inside has its own
+        rtcCommitGeometry(geom);
+        rtcAttachGeometryByID(scene_, geom, i);
+        rtcReleaseGeometry(geom);
+        check();
+      }
+    }
+    commit(scene_);
+    RTCBounds bounds;
+    rtcGetSceneBounds(scene_, &bounds);
+    if (bounds.lower_x <= bounds.upper_x) {
+      info_.bounds.lo = {bounds.lower_x, bounds.lower_y, bounds.lower_z};
+      info_.bounds.hi = {bounds.upper_x, bounds.upper_y, bounds.upper_z};
+    }
+    info_.bytes = static_cast<uint64_t>(std::max<int64_t>(0, state_.bytes.load()));
+  }
+
+  void release() {
+    for (auto scene = scenes_.rbegin(); scene != scenes_.rend(); ++scene) rtcReleaseScene(*scene);
+    scenes_.clear();
+    if (device_ != nullptr) rtcReleaseDevice(device_);
+    device_ = nullptr;
+  }
+
+  DeviceState state_;
+  RTCDevice device_ = nullptr;
+  RTCScene scene_ = nullptr;
+  std::vector<RTCScene> scenes_;
+  std::vector<FilterUser> filters_;
+  AccelInfo info_;
+};
+
+}  // namespace
+
+std::unique_ptr<Accel> make_embree_accel(const AccelGeometry& geometry, const AccelOptions& options,
+                                         Progress* progress) {
+  return std::make_unique<EmbreeAccel>(geometry, options, progress);
+}
+
+}  // namespace lumicut

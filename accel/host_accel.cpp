@@ -1,0 +1,103 @@
+#include "accel/host_accel.h"
+
+#include <string>
+
+#include "accel/validate.h"
+#include "core/error.h"
+
+namespace lumicut {
+namespace {
+
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+class HostAccel final : public Accel {
+ public:
+  HostAccel(const HostCallbacks& callbacks, const AccelGeometry& geometry)
+      : callbacks_(callbacks), geometry_(geometry) {
+    for (const MeshView& mesh : geometry.meshes) info_.triangles += mesh.triangle_count;
+    info_.bounds = bounds_of(geometry);
+  }
+
+  AccelInfo info() const override { return info_; }
+
+  void intersect(std::span<RayHit> rays) const override {
+    if (rays.empty()) return;
+    // Given back with the call, not kept by the thread: a callback may trace in its turn.
+    std::vector<float> limits(rays.size());
+    for (size_t i = 0; i < rays.size(); ++i) {
+      rays[i].hit = {};
+      limits[i] = rays[i].ray.tfar;
+    }
+    callbacks_.intersect(callbacks_.user, rays.data(), rays.size());
+    for (size_t i = 0; i < rays.size(); ++i) {
+      RayHit& r = rays[i];
+      if (r.hit.geom == kNoId || !is_traceable_to(r.ray, limits[i])) {
+        r.hit = {};
+        r.ray.tfar = limits[i];
+        continue;
+      }
+      check(r, limits[i]);
+      const Triangle t = triangle_of(geometry_.meshes[r.hit.geom], r.hit.prim);
+      r.hit.ng = cross(t.v1 - t.v0, t.v2 - t.v0);
+    }
+  }
+
+  void occluded(std::span<Ray> rays) const override {
+    if (!rays.empty()) callbacks_.occluded(callbacks_.user, rays.data(), rays.size());
+  }
+
+  void occluded_from_point(const Vec3f& light, bool directional, const float* px, const float* py, const float* pz,
+                           size_t n, uint8_t* out) const override {
+    if (n == 0) return;
+    std::vector<Ray> rays(n);
+    for (size_t i = 0; i < n; ++i) {
+      const Vec3f p{px[i], py[i], pz[i]};
+      rays[i].org = directional ? p : light;
+      rays[i].dir = directional ? light : p - light;
+      rays[i].tfar = directional ? kInf : 0x1.fffffep-1f;
+    }
+    callbacks_.occluded(callbacks_.user, rays.data(), rays.size());
+    for (size_t i = 0; i < n; ++i) out[i] = rays[i].tfar == -kInf;
+  }
+
+ private:
+  static bool is_traceable_to(Ray ray, float limit) {
+    ray.tfar = limit;
+    return is_traceable(ray);
+  }
+
+  void check(const RayHit& r, float limit) const {
+    const auto wrong = [](const std::string& field, const std::string& value, const std::string& range) {
+      fail_argument("host intersect: " + field + " is " + value + ", not in " + range);
+    };
+    const Hit& h = r.hit;
+    if (h.geom >= geometry_.meshes.size())
+      wrong("hit.geom", std::to_string(h.geom), "[0, " + std::to_string(geometry_.meshes.size()) + ")");
+    const size_t triangles = geometry_.meshes[h.geom].triangle_count;
+    if (h.prim >= triangles) wrong("hit.prim", std::to_string(h.prim), "[0, " + std::to_string(triangles) + ")");
+    if (geometry_.instances.empty() ? h.inst != kNoId : h.inst >= geometry_.instances.size())
+      wrong("hit.inst", std::to_string(h.inst),
+            geometry_.instances.empty() ? "{no instance}" : "[0, " + std::to_string(geometry_.instances.size()) + ")");
+    // Barycentrics may leave the triangle by rounding.
+    if (!(h.u >= -1e-3f && h.v >= -1e-3f && h.u + h.v <= 1.002f))
+      wrong("hit.u + hit.v", std::to_string(h.u) + " + " + std::to_string(h.v), "the triangle");
+    if (!(r.ray.tfar >= r.ray.tnear && r.ray.tfar <= limit))
+      wrong("ray.tfar", std::to_string(r.ray.tfar),
+            "[" + std::to_string(r.ray.tnear) + ", " + std::to_string(limit) + "]");
+  }
+
+  HostCallbacks callbacks_;
+  AccelGeometry geometry_;
+  AccelInfo info_;
+};
+
+}  // namespace
+
+std::unique_ptr<Accel> make_host_accel(const HostCallbacks& callbacks, const AccelGeometry& geometry) {
+  if (callbacks.intersect == nullptr) fail_argument("host accel: intersect is null");
+  if (callbacks.occluded == nullptr) fail_argument("host accel: occluded is null");
+  validate(geometry, nullptr);
+  return std::make_unique<HostAccel>(callbacks, geometry);
+}
+
+}  // namespace lumicut
