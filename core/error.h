@@ -7,7 +7,14 @@
 namespace lumicut {
 
 // Same values as lumicut_result in lumicut.h.
-enum class ErrorCode : int { invalid_argument = 1, invalid_state = 2, unsupported = 3, out_of_memory = 4, cancelled = 5, internal = 6 };
+enum class ErrorCode : int {
+  invalid_argument = 1,
+  invalid_state = 2,
+  unsupported = 3,
+  out_of_memory = 4,
+  cancelled = 5,
+  internal = 6
+};
 
 class Error : public std::runtime_error {
  public:

@@ -1,4 +1,5 @@
-// Messages for the host: a callback given at device creation, else silence. The library never writes to stdout or stderr.
+// Messages for the host: a callback given at device creation, else silence. The library never writes to stdout or
+// stderr.
 #pragma once
 
 #include <string>

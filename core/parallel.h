@@ -1,5 +1,5 @@
-// Threads: a device owns one arena, and all parallel work of its objects runs inside it. Work is cut in fixed chunks, so
-// that what is computed never depends on the number of threads.
+// Threads: a device owns one arena, and all parallel work of its objects runs inside it. Work is cut in fixed chunks,
+// so that what is computed never depends on the number of threads.
 #pragma once
 
 #include <tbb/blocked_range.h>

@@ -17,7 +17,17 @@ constexpr uint64_t hash64(uint64_t x) {
 constexpr uint64_t hash64(uint64_t a, uint64_t b) { return hash64(a * 0x9e3779b97f4a7c15ull + hash64(b)); }
 
 // What a stream of random numbers is for; part of its identity.
-enum class Stage : uint32_t { camera, light_path, light_tree, point_tree, representative, visibility, reference, test, octree_shift };
+enum class Stage : uint32_t {
+  camera,
+  light_path,
+  light_tree,
+  point_tree,
+  representative,
+  visibility,
+  reference,
+  test,
+  octree_shift
+};
 
 // PCG32 (XSH-RR). [O'Neill 2014]
 class Rng {

@@ -27,38 +27,66 @@ struct Vec2f {
 };
 
 template <typename T>
-constexpr Vec3<T> operator+(const Vec3<T>& a, const Vec3<T>& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+constexpr Vec3<T> operator+(const Vec3<T>& a, const Vec3<T>& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
 template <typename T>
-constexpr Vec3<T> operator-(const Vec3<T>& a, const Vec3<T>& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+constexpr Vec3<T> operator-(const Vec3<T>& a, const Vec3<T>& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
 template <typename T>
-constexpr Vec3<T> operator-(const Vec3<T>& a) { return {-a.x, -a.y, -a.z}; }
+constexpr Vec3<T> operator-(const Vec3<T>& a) {
+  return {-a.x, -a.y, -a.z};
+}
 template <typename T>
-constexpr Vec3<T> operator*(const Vec3<T>& a, const Vec3<T>& b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+constexpr Vec3<T> operator*(const Vec3<T>& a, const Vec3<T>& b) {
+  return {a.x * b.x, a.y * b.y, a.z * b.z};
+}
 template <typename T>
-constexpr Vec3<T> operator*(const Vec3<T>& a, std::type_identity_t<T> s) { return {a.x * s, a.y * s, a.z * s}; }
+constexpr Vec3<T> operator*(const Vec3<T>& a, std::type_identity_t<T> s) {
+  return {a.x * s, a.y * s, a.z * s};
+}
 template <typename T>
-constexpr Vec3<T> operator*(std::type_identity_t<T> s, const Vec3<T>& a) { return a * s; }
+constexpr Vec3<T> operator*(std::type_identity_t<T> s, const Vec3<T>& a) {
+  return a * s;
+}
 template <typename T>
-constexpr Vec3<T> operator/(const Vec3<T>& a, std::type_identity_t<T> s) { return {a.x / s, a.y / s, a.z / s}; }
+constexpr Vec3<T> operator/(const Vec3<T>& a, std::type_identity_t<T> s) {
+  return {a.x / s, a.y / s, a.z / s};
+}
 template <typename T>
-constexpr Vec3<T>& operator+=(Vec3<T>& a, const Vec3<T>& b) { return a = a + b; }
+constexpr Vec3<T>& operator+=(Vec3<T>& a, const Vec3<T>& b) {
+  return a = a + b;
+}
 template <typename T>
-constexpr Vec3<T>& operator-=(Vec3<T>& a, const Vec3<T>& b) { return a = a - b; }
+constexpr Vec3<T>& operator-=(Vec3<T>& a, const Vec3<T>& b) {
+  return a = a - b;
+}
 template <typename T>
-constexpr Vec3<T>& operator*=(Vec3<T>& a, const Vec3<T>& b) { return a = a * b; }
+constexpr Vec3<T>& operator*=(Vec3<T>& a, const Vec3<T>& b) {
+  return a = a * b;
+}
 template <typename T>
-constexpr Vec3<T>& operator*=(Vec3<T>& a, std::type_identity_t<T> s) { return a = a * s; }
+constexpr Vec3<T>& operator*=(Vec3<T>& a, std::type_identity_t<T> s) {
+  return a = a * s;
+}
 
 template <typename T>
-constexpr T dot(const Vec3<T>& a, const Vec3<T>& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+constexpr T dot(const Vec3<T>& a, const Vec3<T>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
 template <typename T>
 constexpr Vec3<T> cross(const Vec3<T>& a, const Vec3<T>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 template <typename T>
-constexpr T length2(const Vec3<T>& a) { return dot(a, a); }
+constexpr T length2(const Vec3<T>& a) {
+  return dot(a, a);
+}
 template <typename T>
-T length(const Vec3<T>& a) { return std::sqrt(dot(a, a)); }
+T length(const Vec3<T>& a) {
+  return std::sqrt(dot(a, a));
+}
 // The zero vector stays zero.
 template <typename T>
 Vec3<T> normalize(const Vec3<T>& a) {
@@ -74,7 +102,9 @@ constexpr Vec3<T> max(const Vec3<T>& a, const Vec3<T>& b) {
   return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)};
 }
 template <typename T>
-constexpr T max_component(const Vec3<T>& a) { return std::max(a.x, std::max(a.y, a.z)); }
+constexpr T max_component(const Vec3<T>& a) {
+  return std::max(a.x, std::max(a.y, a.z));
+}
 inline bool is_finite(const Vec3f& a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); }
 
 // Rec.709 luminance of a linear colour.

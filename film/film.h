@@ -35,7 +35,8 @@ class Film {
   // Pixel in image coordinates; components as in channel_table.
   float* pixel(Channel channel, uint32_t x, uint32_t y) {
     const auto c = static_cast<size_t>(channel);
-    return planes_[c].data() + (static_cast<size_t>(y - crop_.y0) * crop_.width() + (x - crop_.x0)) * channel_table()[c].components;
+    return planes_[c].data() +
+           (static_cast<size_t>(y - crop_.y0) * crop_.width() + (x - crop_.x0)) * channel_table()[c].components;
   }
   void set(Channel channel, uint32_t x, uint32_t y, const Rgb& v) {
     float* p = pixel(channel, x, y);

@@ -17,8 +17,8 @@ struct FrameOptions {
 // Tiles of the crop in the order they are rendered.
 std::vector<Rect> frame_tiles(const FrameOptions& options);
 
-// Renders into `film` (whose crop is options.crop). `tile_done` is called from any thread, once a tile, after its pixels
-// are written. Throws Error(cancelled).
+// Renders into `film` (whose crop is options.crop). `tile_done` is called from any thread, once a tile, after its
+// pixels are written. Throws Error(cancelled).
 void render_frame(const Scene& scene, const Integrator& integrator, const FrameOptions& options, Film& film,
                   ShadeContext context, const std::function<void(const Rect&)>& tile_done);
 

@@ -11,8 +11,8 @@ namespace lumicut {
 struct Camera {
   bool orthographic = false;
   Vec3f position{}, right{1, 0, 0}, up{0, 1, 0}, forward{0, 0, -1};  // orthonormal
-  float tan_half_fov_y = 0.5f;  // perspective
-  float height = 2.0f;          // orthographic: world height of the image
+  float tan_half_fov_y = 0.5f;                                       // perspective
+  float height = 2.0f;                                               // orthographic: world height of the image
   float shift_x = 0.0f, shift_y = 0.0f;
   float near_clip = 0.0f, far_clip = std::numeric_limits<float>::infinity();
   float pixel_aspect = 1.0f;

@@ -13,12 +13,13 @@ enum class LightType : uint32_t { point = 0, spot = 1, rectangle = 2, disk = 3, 
 struct Light {
   LightType type = LightType::point;
   uint32_t group = 0;
-  Rgb value{};  // intensity W/sr (point, spot: on the axis), radiance W/(sr·m²) (rectangle, disk), irradiance W/m² (sun)
+  Rgb value{};  // intensity W/sr (point, spot: on the axis), radiance W/(sr·m²) (rectangle, disk), irradiance W/m²
+                // (sun)
   Vec3f position{};
-  float radius = 0.0f;         // point, spot: emitting sphere; sun: angular radius, radians
-  Vec3f direction{0, 0, -1};   // unit; spot: axis; sun: the way light travels
-  float cos_outer = 0.0f;      // spot: cosine of half the opening angle
-  float blend_cosine = 0.0f;   // spot: smoothstep over this much of cosine; 0: sharp
+  float radius = 0.0f;        // point, spot: emitting sphere; sun: angular radius, radians
+  Vec3f direction{0, 0, -1};  // unit; spot: axis; sun: the way light travels
+  float cos_outer = 0.0f;     // spot: cosine of half the opening angle
+  float blend_cosine = 0.0f;  // spot: smoothstep over this much of cosine; 0: sharp
   bool spot_cosine = false;
   Vec3f u{}, v{};              // rectangle: whole edges; disk: whole axes; emits towards u×v
   float spread = 3.14159265f;  // rectangle, disk: opening angle; π: Lambertian

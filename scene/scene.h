@@ -61,13 +61,14 @@ class Scene final : private HitFilter {
   // Returns the mesh's id. Throws on indices out of range, non-finite positions or transforms, arrays of wrong length.
   uint32_t add_mesh(Mesh mesh);
   // Empty vectors: unchanged. Counts must be as before.
-  void update_mesh(uint32_t id, std::vector<Vec3f> positions, std::vector<Vec3f> normals, std::vector<Transform> instances);
+  void update_mesh(uint32_t id, std::vector<Vec3f> positions, std::vector<Vec3f> normals,
+                   std::vector<Transform> instances);
   void set_lights(std::vector<Light> lights);
   void set_environment(const Environment& environment);
   void set_camera(const Camera& camera);
   void set_trace(AccelFactory factory);  // empty: ours again
 
-  // Checks references between the parts (naming what is wrong), builds the accel. On failure the last commit stands.
+  // Checks references between the parts (naming what is wrong), builds the accel. Any setter asks for a new commit.
   void commit(Progress& progress);
   bool committed() const { return committed_; }
   // Rises with each commit: integrators prepared against an older one prepare again.
@@ -90,6 +91,10 @@ class Scene final : private HitFilter {
 
   size_t instance_count(uint32_t mesh) const { return std::max<size_t>(1, meshes_[mesh].instances.size()); }
   const Transform& instance(uint32_t mesh, uint32_t index) const;
+  // What a hit of `accel()` on that instance of that mesh carries in Hit::inst.
+  uint32_t hit_instance(uint32_t mesh, uint32_t index) const {
+    return instanced_ ? first_instance_[mesh] + index : kNoId;
+  }
 
   // Makes a hit of `accel()` whole.
   SurfaceHit surface(const RayHit& hit) const;
@@ -120,7 +125,6 @@ class Scene final : private HitFilter {
   AccelFactory trace_;
   std::unique_ptr<Accel> accel_;
   std::vector<uint32_t> first_instance_;  // of each mesh, in AccelGeometry::instances
-  std::vector<uint32_t> instance_mesh_;
   bool instanced_ = false;
   bool committed_ = false;
   uint64_t version_ = 0;

@@ -9,9 +9,10 @@
 namespace lumicut {
 
 struct VplOptions {
-  uint32_t count = 60000;         // wanted lights in all; what comes is within a few percent
-  float direct_share = 0.25f;     // of them on extended emitters, for their direct light (point, spot and sun lamps take one each)
-  uint32_t max_depth = 8;         // surfaces a light path may meet
+  uint32_t count = 60000;  // wanted lights in all; what comes is within a few percent
+  float direct_share =
+      0.25f;  // of them on extended emitters, for their direct light (point, spot and sun lamps take one each)
+  uint32_t max_depth = 32;  // surfaces a light path may meet
   uint64_t seed = 1;
 };
 

@@ -15,20 +15,26 @@ inline constexpr int kVplKinds = 4;
 struct Vpl {
   Vec3f position{};  // oriented: off its surface by the scene's epsilon. directional: unused
   VplKind kind = VplKind::omni;
-  Vec3f normal{};     // unit; directional: the way light travels; spot: axis; omni: 0
+  Vec3f normal{};  // unit; directional: the way light travels; spot: axis; omni: 0
   uint32_t group = 0;
-  Rgb intensity{};    // W/sr along the normal; directional: irradiance W/m²
+  Rgb intensity{};  // W/sr along the normal; directional: irradiance W/m²
   float cos_outer = 0.0f, blend_cosine = 0.0f, spot_cosine = 0.0f;  // spot alone
-  float reserved[2] = {};
+  float spread_tan = 0.0f;  // spot: narrowed area lamps fall off with max(0, 1 − spread_tan·tanθ)
+  float reserved = 0.0f;
 };
 static_assert(sizeof(Vpl) == 64);
 
-// Share of a spot's intensity at cosine `c` to its axis: a smoothstep, then the cosine where asked.
-inline float spot_profile(float c, float cos_outer, float blend_cosine, float spot_cosine) {
-  float x = blend_cosine > 0.0f ? (c - cos_outer) / blend_cosine : (c > cos_outer ? 1.0f : 0.0f);
+// Share of a spot's intensity at cosine `c` to its axis. The vector twin is in clusters/light_kernel.cpp.
+inline float spot_profile(const Vpl& v, float c) {
+  float x = v.blend_cosine > 0.0f ? (c - v.cos_outer) / v.blend_cosine : (c > v.cos_outer ? 1.0f : 0.0f);
   x = std::min(1.0f, std::max(0.0f, x));
   x = x * x * (3.0f - 2.0f * x);
-  return spot_cosine > 0.0f ? x * std::max(0.0f, c) : x;
+  if (v.spot_cosine > 0.0f) x *= std::max(0.0f, c);
+  if (v.spread_tan > 0.0f && x > 0.0f) {
+    const float sine = std::sqrt(std::max(0.0f, 1.0f - c * c));
+    x *= std::max(0.0f, 1.0f - v.spread_tan * sine / std::max(c, 1e-6f));
+  }
+  return x;
 }
 
 struct VplSet {

@@ -279,7 +279,8 @@ typedef struct lumicut_vpl {
   float cos_outer;    /* spot: falls to 0 at this cosine */
   float blend;        /* spot: smoothstep over this much of cosine */
   float spot_cosine;  /* spot: 1: times the cosine too */
-  float reserved[2];
+  float spread_tan;   /* spot: narrowed area lamps fall off with max(0, 1 - spread_tan tan(theta)); 0: no */
+  float reserved;
 } lumicut_vpl;
 enum { LUMICUT_VPL_OMNI = 0, LUMICUT_VPL_ORIENTED = 1, LUMICUT_VPL_DIRECTIONAL = 2, LUMICUT_VPL_SPOT = 3 };
 

@@ -1,0 +1,44 @@
+#include "film/film.h"
+
+#include <cstring>
+
+#include "core/error.h"
+
+namespace lumicut {
+
+std::span<const ChannelInfo> channel_table() {
+  static constexpr ChannelInfo table[] = {
+      {Channel::radiance, "radiance", 3, "Radiance, linear Rec.709, W/(sr m2)"},
+      {Channel::alpha, "alpha", 1, "Share of the pixel that geometry covers"},
+      {Channel::depth, "depth", 1, "Distance along the camera's axis, scene units; 0 where nothing is hit"},
+      {Channel::normal, "normal", 3, "Shading normal in world space, turned to the viewer"},
+      {Channel::albedo, "albedo", 3, "Diffuse and specular reflectance"},
+      {Channel::position, "position", 3, "World position, scene units"},
+      {Channel::cut_size, "cut_size", 1, "Clusters or lights summed, a sample"},
+      {Channel::rays, "rays", 1, "Shadow rays, a sample"},
+      {Channel::bounds, "bounds", 1, "Error bounds evaluated, a sample"},
+  };
+  return table;
+}
+
+Film::Film(Rect crop) : crop_(crop) {
+  const size_t pixels = size_t{crop.width()} * crop.height();
+  for (const ChannelInfo& c : channel_table())
+    planes_[static_cast<size_t>(c.channel)].assign(pixels * c.components, 0.0f);
+}
+
+void Film::read(Channel channel, const Rect& rect, float* out) const {
+  if (rect.x0 < crop_.x0 || rect.y0 < crop_.y0 || rect.x1 > crop_.x1 || rect.y1 > crop_.y1 || rect.x0 > rect.x1 ||
+      rect.y0 > rect.y1)
+    fail_argument("rectangle (" + std::to_string(rect.x0) + ", " + std::to_string(rect.y0) + ", " +
+                  std::to_string(rect.x1) + ", " + std::to_string(rect.y1) + ") is not inside the crop");
+  const auto c = static_cast<size_t>(channel);
+  const size_t components = channel_table()[c].components;
+  const size_t row = size_t{rect.width()} * components;
+  for (uint32_t y = rect.y0; y < rect.y1; ++y) {
+    const size_t first = (size_t{y - crop_.y0} * crop_.width() + (rect.x0 - crop_.x0)) * components;
+    std::memcpy(out + (y - rect.y0) * row, planes_[c].data() + first, row * sizeof(float));
+  }
+}
+
+}  // namespace lumicut

@@ -1,0 +1,279 @@
+#include "scene/scene.h"
+
+#include "core/error.h"
+
+namespace lumicut {
+
+namespace {
+
+constexpr float kInvPi = 0.31830988618f;
+
+std::string at(const char* what, size_t i) { return std::string(what) + "[" + std::to_string(i) + "]"; }
+
+void check_finite(const std::vector<Vec3f>& values, const char* what) {
+  for (size_t i = 0; i < values.size(); ++i)
+    if (!is_finite(values[i])) fail_argument(at(what, i) + " is not finite");
+}
+
+void check_transforms(const std::vector<Transform>& transforms) {
+  for (size_t i = 0; i < transforms.size(); ++i)
+    for (float m : transforms[i].m)
+      if (!std::isfinite(m)) fail_argument(at("mesh transform", i) + " is not finite");
+}
+
+void check_mesh(const Mesh& mesh) {
+  const size_t n = mesh.positions.size();
+  if (mesh.indices.size() % 3 != 0)
+    fail_argument("mesh has " + std::to_string(mesh.indices.size()) + " indices, not a multiple of 3");
+  if (n >= kNoId || mesh.triangle_count() >= kNoId) fail_argument("mesh has more than 2^32-2 vertices or triangles");
+  if (!mesh.normals.empty() && mesh.normals.size() != n)
+    fail_argument("mesh has " + std::to_string(mesh.normals.size()) + " normals for " + std::to_string(n) +
+                  " vertices");
+  if (!mesh.uvs.empty() && mesh.uvs.size() != n)
+    fail_argument("mesh has " + std::to_string(mesh.uvs.size()) + " uvs for " + std::to_string(n) + " vertices");
+  if (!mesh.triangle_materials.empty() && mesh.triangle_materials.size() != mesh.triangle_count())
+    fail_argument("mesh has " + std::to_string(mesh.triangle_materials.size()) + " triangle materials for " +
+                  std::to_string(mesh.triangle_count()) + " triangles");
+  check_finite(mesh.positions, "mesh position");
+  for (size_t i = 0; i < mesh.indices.size(); ++i)
+    if (mesh.indices[i] >= n)
+      fail_argument(at("mesh index", i) + " = " + std::to_string(mesh.indices[i]) + " is out of range: the mesh has " +
+                    std::to_string(n) + " vertices");
+  check_transforms(mesh.instances);
+}
+
+// Broken shading normals fall back to flat ones rather than spread NaN.
+void mend_normals(std::vector<Vec3f>& normals) {
+  for (Vec3f& n : normals)
+    if (!is_finite(n)) n = {};
+}
+
+}  // namespace
+
+void Scene::set_textures(std::vector<Texture> textures) {
+  textures_ = std::move(textures);
+  committed_ = false;
+}
+void Scene::set_materials(std::vector<Material> materials) {
+  materials_ = std::move(materials);
+  committed_ = false;
+}
+
+uint32_t Scene::add_mesh(Mesh mesh) {
+  check_mesh(mesh);
+  mend_normals(mesh.normals);
+  meshes_.push_back(std::move(mesh));
+  committed_ = false;
+  return static_cast<uint32_t>(meshes_.size() - 1);
+}
+
+void Scene::update_mesh(uint32_t id, std::vector<Vec3f> positions, std::vector<Vec3f> normals,
+                        std::vector<Transform> instances) {
+  if (id >= meshes_.size())
+    fail_argument("mesh id " + std::to_string(id) + " is out of range: the scene has " +
+                  std::to_string(meshes_.size()));
+  Mesh& mesh = meshes_[id];
+  if (!positions.empty() && positions.size() != mesh.positions.size())
+    fail_argument("update of mesh " + std::to_string(id) + " changes its vertex count");
+  if (!normals.empty() && normals.size() != mesh.positions.size())
+    fail_argument("update of mesh " + std::to_string(id) + " has a wrong count of normals");
+  if (!instances.empty() && instances.size() != std::max<size_t>(1, mesh.instances.size()))
+    fail_argument("update of mesh " + std::to_string(id) + " changes its count of transforms");
+  check_finite(positions, "mesh position");
+  check_transforms(instances);
+  mend_normals(normals);
+  if (!positions.empty()) mesh.positions = std::move(positions);
+  if (!normals.empty()) mesh.normals = std::move(normals);
+  if (!instances.empty()) mesh.instances = std::move(instances);
+  committed_ = false;
+}
+
+void Scene::set_lights(std::vector<Light> lights) {
+  lights_ = std::move(lights);
+  committed_ = false;
+}
+void Scene::set_environment(const Environment& environment) {
+  environment_ = environment;
+  committed_ = false;
+}
+void Scene::set_camera(const Camera& camera) {
+  camera_ = camera;
+  has_camera_ = true;
+  committed_ = false;
+}
+void Scene::set_trace(AccelFactory factory) {
+  trace_ = std::move(factory);
+  committed_ = false;
+}
+
+void Scene::check_references() const {
+  const auto check_texture = [&](int32_t index, size_t material, const char* field) {
+    if (index >= 0 && static_cast<size_t>(index) >= textures_.size())
+      fail_argument(at("material", material) + "." + field + " = " + std::to_string(index) +
+                    " is out of range: the scene has " + std::to_string(textures_.size()) + " textures");
+  };
+  for (size_t i = 0; i < materials_.size(); ++i) {
+    check_texture(materials_[i].diffuse_texture, i, "diffuse_texture");
+    check_texture(materials_[i].specular_texture, i, "specular_texture");
+    check_texture(materials_[i].opacity_texture, i, "opacity_texture");
+    check_texture(materials_[i].emission_texture, i, "emission_texture");
+  }
+  if (environment_.texture >= 0 && static_cast<size_t>(environment_.texture) >= textures_.size())
+    fail_argument("environment.texture = " + std::to_string(environment_.texture) + " is out of range: the scene has " +
+                  std::to_string(textures_.size()) + " textures");
+  for (size_t m = 0; m < meshes_.size(); ++m) {
+    const auto check = [&](uint32_t material) {
+      if (material >= materials_.size())
+        fail_argument(at("mesh", m) + " material " + std::to_string(material) + " is out of range: the scene has " +
+                      std::to_string(materials_.size()) + " materials");
+    };
+    if (meshes_[m].triangle_materials.empty() && meshes_[m].triangle_count() > 0) check(meshes_[m].material);
+    for (uint32_t material : meshes_[m].triangle_materials) check(material);
+  }
+}
+
+void Scene::commit(Progress& progress) {
+  progress.begin("acceleration structure", 1);
+  check_references();
+
+  const bool instanced = std::any_of(meshes_.begin(), meshes_.end(), [](const Mesh& m) {
+    return m.instances.size() > 1 || (m.instances.size() == 1 && m.instances[0] != Transform{});
+  });
+  AccelGeometry geometry;
+  geometry.filter = this;
+  std::vector<uint32_t> first_instance;
+  Aabb bounds;
+  for (uint32_t m = 0; m < meshes_.size(); ++m) {
+    const Mesh& mesh = meshes_[m];
+    bool cutout = mesh.triangle_materials.empty() && mesh.triangle_count() > 0 && materials_[mesh.material].cutout();
+    for (uint32_t material : mesh.triangle_materials) cutout = cutout || materials_[material].cutout();
+    geometry.meshes.push_back(
+        {mesh.positions.data(), mesh.positions.size(), mesh.indices.data(), mesh.triangle_count(), mesh.mask, cutout});
+    first_instance.push_back(static_cast<uint32_t>(geometry.instances.size()));
+    for (uint32_t i = 0; i < instance_count(m); ++i) {
+      const Transform& t = instance(m, i);
+      if (instanced) geometry.instances.push_back({m, t});
+      for (uint32_t index : mesh.indices) bounds.extend(t.point(mesh.positions[index]));
+    }
+  }
+  if (!bounds.empty() && !(is_finite(bounds.lo) && is_finite(bounds.hi) && std::isfinite(bounds.diagonal2())))
+    fail_argument("the scene's bounds overflow single precision");
+
+  auto accel = trace_ ? trace_(geometry) : make_accel(config_.accel, geometry, {config_.robust, ""}, &progress);
+  accel_ = std::move(accel);
+  first_instance_ = std::move(first_instance);
+  instanced_ = instanced;
+  bounds_ = bounds;
+  radius_ = bounds.empty() || bounds.diagonal() == 0.0f ? 1.0f : 0.5f * bounds.diagonal();
+  const float largest =
+      bounds.empty() ? 0.0f
+                     : std::max(max_component(bounds.hi), -std::min(bounds.lo.x, std::min(bounds.lo.y, bounds.lo.z)));
+  // 2e-5 of the radius is far below what is seen; 4e-6 of the coordinates is some 60 units in the last place.
+  epsilon_ = std::max(2e-5f * radius_, 4e-6f * largest);
+  committed_ = true;
+  ++version_;
+  progress.advance(1);
+}
+
+const Transform& Scene::instance(uint32_t mesh, uint32_t index) const {
+  static const Transform identity;
+  return meshes_[mesh].instances.empty() ? identity : meshes_[mesh].instances[index];
+}
+
+bool Scene::passes(uint32_t mesh_id, uint32_t prim, float u, float v) const {
+  const Mesh& mesh = meshes_[mesh_id];
+  const Material& material = materials_[mesh.material_of(prim)];
+  float opacity = material.opacity;
+  if (material.opacity_texture >= 0 && !mesh.uvs.empty()) {
+    const uint32_t* t = &mesh.indices[3 * size_t{prim}];
+    const Vec2f a = mesh.uvs[t[0]], b = mesh.uvs[t[1]], c = mesh.uvs[t[2]];
+    opacity *= textures_[material.opacity_texture].mask(a.x + u * (b.x - a.x) + v * (c.x - a.x),
+                                                        a.y + u * (b.y - a.y) + v * (c.y - a.y));
+  }
+  return opacity < 0.5f;
+}
+
+SurfaceHit Scene::surface(const RayHit& rh) const {
+  const Hit& hit = rh.hit;
+  const Mesh& mesh = meshes_[hit.geom];
+  const uint32_t* tri = &mesh.indices[3 * size_t{hit.prim}];
+  const Transform& to_world = instance(hit.geom, instanced_ ? hit.inst - first_instance_[hit.geom] : 0);
+  Vec3f p[3];
+  for (int k = 0; k < 3; ++k) p[k] = instanced_ ? to_world.point(mesh.positions[tri[k]]) : mesh.positions[tri[k]];
+  const float w = 1.0f - hit.u - hit.v;
+
+  SurfaceHit s;
+  s.mesh = hit.geom;
+  s.triangle = hit.prim;
+  s.material = mesh.material_of(hit.prim);
+  s.t = rh.ray.tfar;
+  s.position = p[0] * w + p[1] * hit.u + p[2] * hit.v;
+  s.geometric_normal = normalize(cross(p[1] - p[0], p[2] - p[0]));
+  // A mirroring instance turns the winding over; the front stays the front.
+  if (instanced_) {
+    const Vec3f local =
+        cross(mesh.positions[tri[1]] - mesh.positions[tri[0]], mesh.positions[tri[2]] - mesh.positions[tri[0]]);
+    if (dot(to_world.normal(local), s.geometric_normal) < 0.0f) s.geometric_normal = -s.geometric_normal;
+  }
+  if (s.geometric_normal == Vec3f{}) s.geometric_normal = normalize(-rh.ray.dir);
+  s.normal = s.geometric_normal;
+  if (!mesh.normals.empty()) {
+    Vec3f n = mesh.normals[tri[0]] * w + mesh.normals[tri[1]] * hit.u + mesh.normals[tri[2]] * hit.v;
+    if (instanced_) n = to_world.normal(n);
+    n = normalize(n);
+    if (n != Vec3f{}) s.normal = dot(n, s.geometric_normal) < 0.0f ? -n : n;
+  }
+  if (!mesh.uvs.empty()) {
+    const Vec2f a = mesh.uvs[tri[0]], b = mesh.uvs[tri[1]], c = mesh.uvs[tri[2]];
+    s.uv = {a.x * w + b.x * hit.u + c.x * hit.v, a.y * w + b.y * hit.u + c.y * hit.v};
+  }
+  return s;
+}
+
+SurfacePoint Scene::shade_point(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const {
+  return shade_point(hit.position, hit.geometric_normal, hit.normal, hit.uv, hit.material, to_viewer, pixel);
+}
+
+SurfacePoint Scene::shade_point(const Vec3f& position, const Vec3f& geometric_normal, const Vec3f& normal, Vec2f uv,
+                                uint32_t material_index, const Vec3f& to_viewer, uint32_t pixel) const {
+  const Material& material = materials_[material_index];
+  const bool behind = dot(geometric_normal, to_viewer) < 0.0f;  // two-sided: scenes are wound as they are
+  SurfacePoint p;
+  p.position = position + geometric_normal * (behind ? -epsilon_ : epsilon_);
+  p.normal = behind ? -normal : normal;
+  p.mirror = normalize(reflect(to_viewer, p.normal));
+  p.diffuse = diffuse_color(material_index, uv) * kInvPi;
+  p.specular = specular_color(material_index, uv) * lobe_scale(material.phong, material.shininess);
+  p.shininess = material.shininess;
+  p.pixel = pixel;
+  return p;
+}
+
+Rgb Scene::diffuse_color(uint32_t material, Vec2f uv) const {
+  const Material& m = materials_[material];
+  return m.diffuse_texture < 0 ? m.diffuse : m.diffuse * textures_[m.diffuse_texture].color(uv.x, uv.y);
+}
+
+Rgb Scene::specular_color(uint32_t material, Vec2f uv) const {
+  const Material& m = materials_[material];
+  return m.specular_texture < 0 ? m.specular : m.specular * textures_[m.specular_texture].color(uv.x, uv.y);
+}
+
+Rgb Scene::emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const {
+  const Material& m = materials_[hit.material];
+  if (!m.emissive() || (!m.emit_both_sides && dot(hit.geometric_normal, to_viewer) <= 0.0f)) return {};
+  return m.emission_texture < 0 ? m.emission : m.emission * textures_[m.emission_texture].color(hit.uv.x, hit.uv.y);
+}
+
+Rgb Scene::environment_radiance(const Vec3f& direction) const {
+  if (environment_.texture < 0) return environment_.color;
+  const float* m = environment_.world_to_map;
+  const Vec3f d{m[0] * direction.x + m[1] * direction.y + m[2] * direction.z,
+                m[3] * direction.x + m[4] * direction.y + m[5] * direction.z,
+                m[6] * direction.x + m[7] * direction.y + m[8] * direction.z};
+  const float u = 0.5f - std::atan2(d.y, d.x) * (0.5f * kInvPi);
+  const float v = 0.5f + std::atan2(d.z, std::hypot(d.x, d.y)) * kInvPi;
+  return environment_.color * textures_[environment_.texture].color(u, v);
+}
+
+}  // namespace lumicut

@@ -1,0 +1,81 @@
+// All that emits in a scene, as one distribution: chosen by power, sampled in position and direction. [Keller 1997]
+#pragma once
+
+#include <vector>
+
+#include "core/rng.h"
+#include "scene/scene.h"
+#include "vpl/vpl.h"
+
+namespace lumicut {
+
+// Discrete distribution by inverted cumulative sums. pmf(i) is what sample() draws with.
+class DiscreteDistribution {
+ public:
+  DiscreteDistribution() = default;
+  explicit DiscreteDistribution(const std::vector<double>& weights);
+  bool empty() const { return !(total_ > 0.0); }
+  double total() const { return total_; }
+  size_t size() const { return cdf_.empty() ? 0 : cdf_.size() - 1; }
+  // u in [0,1). Never an index of weight 0.
+  size_t sample(double u) const;
+  double pmf(size_t i) const { return (cdf_[i + 1] - cdf_[i]) / total_; }
+
+ private:
+  std::vector<double> cdf_;
+  double total_ = 0.0;
+};
+
+// Where a light path starts.
+struct EmittedRay {
+  Vec3f origin, direction;  // unit
+  Rgb flux{};               // W that the path carries, already divided by its probability
+  uint32_t group = 0;
+};
+
+class Emitters {
+ public:
+  explicit Emitters(const Scene& scene);
+  bool empty() const { return power_.empty(); }
+
+  // Lamps without extent: one VPL each, exactly.
+  const std::vector<Vpl>& delta_lights() const { return delta_; }
+  // True where some emitter has extent, and so needs many VPLs for its direct light.
+  bool has_extended() const { return !extended_power_.empty(); }
+  // One of `count` VPLs that stand for the extended emitters' direct light; `u` in [0,1) chooses the emitter by power.
+  Vpl sample_direct(double u, uint64_t count, Rng& rng) const;
+  EmittedRay sample_ray(Rng& rng) const;
+
+ private:
+  enum class Kind : uint8_t { point, spot, sphere, rectangle, disk, sun, environment, triangle };
+  struct Emitter {
+    Kind kind;
+    uint32_t index;     // lamp, or mesh
+    uint32_t instance;  // triangle
+    uint32_t triangle;
+  };
+  struct Surface {  // a sampled point of an emitting surface
+    Vec3f position, normal;
+    Rgb radiance;
+    float area_pdf;
+  };
+
+  void add(const Emitter& e, double power, bool extended);
+  Surface sample_surface(const Emitter& e, Rng& rng) const;
+  // Direction towards the environment, its radiance and density per steradian.
+  Vec3f sample_environment(Rng& rng, Rgb& radiance, float& pdf) const;
+  // Direction in which light of a sun travels.
+  Vec3f sample_sun(const Light& light, Rng& rng) const;
+  EmittedRay distant_ray(const Vec3f& travel, const Rgb& irradiance, Rng& rng) const;
+  Vec3f offset(const Surface& s) const { return s.position + s.normal * scene_.epsilon(); }
+
+  const Scene& scene_;
+  std::vector<Emitter> emitters_, extended_;
+  std::vector<double> weights_, extended_weights_;
+  DiscreteDistribution power_, extended_power_;
+  std::vector<Vpl> delta_;
+  // Environment: density over texels, rows weighted by the sine of the polar angle.
+  DiscreteDistribution texels_;
+};
+
+}  // namespace lumicut

@@ -1,0 +1,169 @@
+// Light tracing: lamps, emissive meshes and environment → VPLs. [Keller 1997; Walter et al. 2005 sec. 5; thesis ch. 1]
+// Departs: emitters are chosen by power, and flux is divided by the number of light paths that were started (dividing
+// by the number of VPLs, as some codes do, halves the indirect light of a closed room of albedo ½).
+#include "vpl/trace_vpls.h"
+
+#include <numbers>
+
+#include "vpl/emitters.h"
+
+namespace lumicut {
+
+namespace {
+
+constexpr size_t kPathsPerChunk = 1024;
+constexpr float kInvPi = std::numbers::inv_pi_v<float>;
+
+struct LightPath {
+  Vec3f origin, direction;
+  Rgb flux{};
+  uint32_t group = 0;
+  Rng rng;
+};
+
+// A VPL with the light path it came from, to keep the order of paths whatever the order of work.
+struct PathVpl {
+  uint64_t path;
+  Vpl vpl;
+};
+
+// Follows paths [first, last) in step, so that rays are traced in batches.
+std::vector<PathVpl> trace_paths(const Scene& scene, const Emitters& emitters, const VplOptions& options,
+                                 uint64_t first, uint64_t last) {
+  std::vector<PathVpl> vpls;
+  std::vector<LightPath> paths;
+  std::vector<uint64_t> ids;
+  for (uint64_t i = first; i < last; ++i) {
+    Rng rng(options.seed, Stage::light_path, i);
+    const EmittedRay e = emitters.sample_ray(rng);
+    if (!(max_component(e.flux) > 0.0f)) continue;
+    paths.push_back({e.origin, e.direction, e.flux, e.group, rng});
+    ids.push_back(i);
+  }
+  std::vector<RayHit> rays;
+  for (uint32_t depth = 0; depth < options.max_depth && !paths.empty(); ++depth) {
+    rays.assign(paths.size(), {});
+    for (size_t i = 0; i < paths.size(); ++i) rays[i].ray.org = paths[i].origin, rays[i].ray.dir = paths[i].direction;
+    scene.accel().intersect(rays);
+    size_t alive = 0;
+    for (size_t i = 0; i < paths.size(); ++i) {
+      if (rays[i].hit.geom == kNoId) continue;
+      LightPath path = paths[i];
+      const SurfaceHit surface = scene.surface(rays[i]);
+      const Vec3f wo = -path.direction;
+      const bool behind = dot(surface.geometric_normal, wo) < 0.0f;
+      const Vec3f side = behind ? -surface.geometric_normal : surface.geometric_normal;
+      const Vec3f normal = behind ? -surface.normal : surface.normal;
+      const Rgb kd = scene.diffuse_color(surface.material, surface.uv);
+      const Rgb ks = scene.specular_color(surface.material, surface.uv);
+      const Vec3f position = surface.position + side * scene.epsilon();
+      if (max_component(kd) > 0.0f) {
+        Vpl v;
+        v.position = position, v.kind = VplKind::oriented, v.normal = normal, v.group = path.group;
+        v.intensity = path.flux * kd * kInvPi;
+        if (max_component(v.intensity) > 0.0f && is_finite(v.intensity)) vpls.push_back({ids[i], v});
+      }
+      // Russian roulette on the lobe's largest reflectance keeps the flux of all paths alike.
+      const float qd = std::min(1.0f, max_component(kd)), qs = std::min(1.0f, max_component(ks));
+      const float survive = std::min(1.0f, qd + qs);
+      const float choice = path.rng.next_float(), u = path.rng.next_float(), v = path.rng.next_float();
+      if (!(choice < survive)) continue;
+      const float p_diffuse = survive * qd / (qd + qs);
+      if (choice < p_diffuse) {
+        const float r = std::sqrt(u), phi = 2.0f * std::numbers::pi_v<float> * v;
+        path.direction =
+            Frame(normal).to_world({r * std::cos(phi), r * std::sin(phi), std::sqrt(std::max(0.0f, 1.0f - u))});
+        path.flux = path.flux * kd * (1.0f / p_diffuse);
+      } else {
+        const Material& material = scene.materials()[surface.material];
+        const float n = material.shininess;
+        const float cosine = std::pow(u, 1.0f / (n + 1.0f)), sine = std::sqrt(std::max(0.0f, 1.0f - cosine * cosine));
+        const float phi = 2.0f * std::numbers::pi_v<float> * v;
+        path.direction =
+            Frame(normalize(reflect(wo, normal))).to_world({sine * std::cos(phi), sine * std::sin(phi), cosine});
+        // lobe·cosθ / pdf, with pdf = (n+1)/2π cosⁿβ
+        const float scale = lobe_scale(material.phong, n) * 2.0f * std::numbers::pi_v<float> / (n + 1.0f);
+        path.flux = path.flux * ks * (scale * std::max(0.0f, dot(path.direction, normal)) / (survive - p_diffuse));
+      }
+      if (!(dot(path.direction, side) > 0.0f) || !(max_component(path.flux) > 0.0f)) continue;
+      path.origin = position;
+      paths[alive] = path;
+      ids[alive++] = ids[i];
+    }
+    paths.erase(paths.begin() + static_cast<ptrdiff_t>(alive), paths.end());
+    ids.resize(alive);
+  }
+  std::stable_sort(vpls.begin(), vpls.end(), [](const PathVpl& a, const PathVpl& b) { return a.path < b.path; });
+  return vpls;
+}
+
+void trace_indirect(const Scene& scene, const Emitters& emitters, const VplOptions& options, uint64_t wanted,
+                    Progress& progress, VplSet& set) {
+  // Rounds whose size depends on counts alone, never on threads; the last path kept is the one that fills the budget.
+  const uint64_t most_paths = std::max<uint64_t>(wanted * 16, 65536);
+  std::vector<PathVpl> vpls;
+  uint64_t paths = 0;
+  while (vpls.size() < wanted && paths < most_paths) {
+    progress.check();
+    const uint64_t missing = wanted - vpls.size();
+    const double per_path =
+        vpls.empty() ? 1.0 : std::max(0.05, static_cast<double>(vpls.size()) / static_cast<double>(paths));
+    const uint64_t round = std::min(
+        most_paths - paths,
+        std::max<uint64_t>(kPathsPerChunk, static_cast<uint64_t>(static_cast<double>(missing) / per_path) + 1));
+    const size_t chunks = (round + kPathsPerChunk - 1) / kPathsPerChunk;
+    std::vector<std::vector<PathVpl>> parts(chunks);
+    tbb::parallel_for(size_t{0}, chunks, [&](size_t c) {
+      if (progress.cancelled()) return;
+      parts[c] = trace_paths(scene, emitters, options, paths + c * kPathsPerChunk,
+                             paths + std::min<uint64_t>(round, (c + 1) * kPathsPerChunk));
+      progress.advance(parts[c].size());
+    });
+    progress.check();
+    for (const auto& part : parts) vpls.insert(vpls.end(), part.begin(), part.end());
+    paths += round;
+  }
+  if (vpls.size() > wanted) {
+    // Whole paths only; those after the last one kept were never started, as far as the estimate goes.
+    const uint64_t last = vpls[wanted - 1].path;
+    const auto end = std::find_if(vpls.begin() + static_cast<ptrdiff_t>(wanted), vpls.end(),
+                                  [&](const PathVpl& v) { return v.path != last; });
+    if (end != vpls.end()) paths = last + 1;
+    vpls.erase(end, vpls.end());
+  }
+  const float normalise = 1.0f / static_cast<float>(paths);
+  for (PathVpl& v : vpls) {
+    v.vpl.intensity = v.vpl.intensity * normalise;
+    set.lights.push_back(v.vpl);
+  }
+  set.light_paths = paths;
+}
+
+}  // namespace
+
+VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progress) {
+  progress.begin("light paths", options.count);
+  VplSet set;
+  const Emitters emitters(scene);
+  if (emitters.empty()) return set;
+  set.lights = emitters.delta_lights();
+  const uint64_t budget = options.count > set.lights.size() ? options.count - set.lights.size() : 0;
+  if (emitters.has_extended()) {
+    const double share = options.max_depth > 0 ? options.direct_share : 1.0;
+    const auto direct = std::max<uint64_t>(1, static_cast<uint64_t>(share * static_cast<double>(budget)));
+    for (uint64_t i = 0; i < direct; ++i) {
+      if (i % 4096 == 0) progress.check();
+      Rng rng(options.seed, Stage::light_path, i, 1);
+      const Vpl v = emitters.sample_direct((static_cast<double>(i) + rng.next_float()) / static_cast<double>(direct),
+                                           direct, rng);
+      if (max_component(v.intensity) > 0.0f && is_finite(v.intensity)) set.lights.push_back(v);
+    }
+    progress.advance(direct);
+  }
+  const uint64_t indirect = options.count > set.lights.size() ? options.count - set.lights.size() : 0;
+  if (indirect > 0 && options.max_depth > 0 && !scene.bounds().empty())
+    trace_indirect(scene, emitters, options, indirect, progress, set);
+  return set;
+}
+
+}  // namespace lumicut
