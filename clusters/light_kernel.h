@@ -1,0 +1,42 @@
+// One light against many points: the inner loop of every method. SIMD over points, picked at run time.
+#pragma once
+
+#include <cstdint>
+
+#include "accel/accel.h"
+#include "core/stats.h"
+#include "scene/shade_points.h"
+#include "vpl/vpl.h"
+
+namespace lumicut {
+
+// Most points that one call takes.
+inline constexpr size_t kMaxLit = 256;
+
+// Points that a light reaches if nothing stands between: contribution in radiance, and where the shadow ray ends.
+struct LitPoints {
+  alignas(64) float x[kMaxLit + kLanes], y[kMaxLit + kLanes], z[kMaxLit + kLanes];
+  alignas(64) float r[kMaxLit + kLanes], g[kMaxLit + kLanes], b[kMaxLit + kLanes];
+  alignas(64) uint32_t index[kMaxLit + kLanes];  // counted from the first point of the call
+  uint8_t occluded[kMaxLit + kLanes];
+  size_t count = 0;
+};
+
+// Unshadowed radiance of `light`, with the summed intensity `intensity` in place of its own, at points
+// [first, first + count) of `points`; first a multiple of kLanes, count <= kMaxLit. Only points that get any are kept,
+// in order. `clamp2`: squared distance below which no light comes nearer. [thesis Eq. 1.1 without V]
+void light_points(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
+                  size_t count, LitPoints& lit);
+
+// Shadow rays from the light to the lit points; fills `occluded`.
+inline void trace_lit(const Accel& accel, const Vpl& light, LitPoints& lit) {
+  if (lit.count == 0) return;
+  const bool directional = light.kind == VplKind::directional;
+  accel.occluded_from_point(directional ? -light.normal : light.position, directional, lit.x, lit.y, lit.z, lit.count,
+                            lit.occluded);
+}
+
+// The same for one point, in plain arithmetic: what the kernel is tested against, and for code that is not hot.
+Rgb light_point(const Vpl& light, const Rgb& intensity, float clamp2, const SurfacePoint& point);
+
+}  // namespace lumicut

@@ -1,0 +1,189 @@
+#include "integrators/frame.h"
+
+#include <atomic>
+
+#include "core/parallel.h"
+#include "core/rng.h"
+
+namespace lumicut {
+
+namespace {
+
+// Bits of x at the even places of a 32-bit word, taken together.
+uint32_t even_bits(uint32_t x) {
+  x &= 0x55555555u;
+  x = (x | x >> 1) & 0x33333333u;
+  x = (x | x >> 2) & 0x0f0f0f0fu;
+  x = (x | x >> 4) & 0x00ff00ffu;
+  return (x | x >> 8) & 0x0000ffffu;
+}
+
+// Fills the unit square evenly for any count. [Roberts 2018, R2 sequence]
+Vec2f r2(uint32_t i, Vec2f shift) {
+  const double x = 0.5 + shift.x + i * 0.7548776662466927, y = 0.5 + shift.y + i * 0.5698402909980532;
+  return {static_cast<float>(x - std::floor(x)), static_cast<float>(y - std::floor(y))};
+}
+
+struct PixelSums {
+  Rgb radiance{}, normal{}, albedo{};
+  Vec3f position{};
+  float depth = 0.0f, hits = 0.0f;
+};
+
+class Batch {
+ public:
+  Batch(const Scene& scene, const FrameOptions& options) : scene_(scene), options_(options) {}
+
+  void add_tile(const Rect& tile) {
+    tiles_.push_back(tile);
+    const uint32_t side = std::max(tile.width(), tile.height());
+    uint32_t bits = 1;
+    while ((1u << bits) < side) ++bits;
+    // Morton order within the tile: neighbours in the image lie together in memory, and share packets.
+    for (uint32_t code = 0; code < 1u << (2 * bits); ++code) {
+      const uint32_t x = tile.x0 + even_bits(code), y = tile.y0 + even_bits(code >> 1);
+      if (x < tile.x1 && y < tile.y1) pixels_.push_back({x, y});
+    }
+  }
+
+  // Camera rays → points.
+  void collect() {
+    const uint32_t samples = options_.samples;
+    sums_.resize(pixels_.size());
+    rays_.resize(pixels_.size() * samples);
+    std::vector<float> cosines(rays_.size());
+    for (size_t p = 0; p < pixels_.size(); ++p) {
+      const auto [x, y] = pixels_[p];
+      Rng rng(options_.seed, Stage::camera, x, y);
+      // One sample lies at the centre; more are shifted by a random vector of the pixel's own.
+      const Vec2f shift = samples == 1 ? Vec2f{0, 0} : Vec2f{rng.next_float(), rng.next_float()};
+      const Vec2f lens_shift = {rng.next_float(), rng.next_float()};
+      for (uint32_t s = 0; s < samples; ++s) {
+        const Vec2f at = r2(s, shift), lens = r2(s, lens_shift);
+        const Camera::Sample c = scene_.camera().generate(static_cast<float>(x) + at.x, static_cast<float>(y) + at.y,
+                                                          static_cast<float>(options_.width),
+                                                          static_cast<float>(options_.height), lens.x, lens.y);
+        RayHit& r = rays_[p * samples + s];
+        r.ray.org = c.origin, r.ray.dir = c.direction, r.ray.tnear = c.tnear, r.ray.tfar = c.tfar;
+        cosines[p * samples + s] = c.forward_cosine;
+      }
+    }
+    if (!scene_.bounds().empty()) scene_.accel().intersect(rays_);
+    points_.reserve(rays_.size());
+    for (size_t i = 0; i < rays_.size(); ++i) {
+      const size_t p = i / samples;
+      const Vec3f to_viewer = -rays_[i].ray.dir;
+      if (rays_[i].hit.geom == kNoId) {
+        sums_[p].radiance += scene_.environment_radiance(rays_[i].ray.dir);
+        continue;
+      }
+      const SurfaceHit surface = scene_.surface(rays_[i]);
+      const SurfacePoint point = scene_.shade_point(surface, to_viewer, static_cast<uint32_t>(p));
+      points_.push(point);
+      PixelSums& sum = sums_[p];
+      sum.radiance += scene_.emitted(surface, to_viewer);
+      sum.normal += point.normal;
+      sum.albedo +=
+          min(scene_.diffuse_color(surface.material, surface.uv) + scene_.specular_color(surface.material, surface.uv),
+              Rgb{1, 1, 1});
+      if (sum.hits == 0.0f) sum.position = surface.position, sum.depth = surface.t * cosines[i];
+      sum.hits += 1.0f;
+    }
+    points_.finish();
+    rays_ = {};
+  }
+
+  void shade(const Integrator& integrator, ShadeContext context) {
+    radiance_.resize(points_.size());
+    counts_.resize(points_.size());
+    integrator.shade(points_, radiance_, counts_, context);
+  }
+
+  void write(Film& film) const {
+    std::vector<Rgb> light(pixels_.size());
+    std::vector<Vec3f> counts(pixels_.size());
+    for (size_t i = 0; i < points_.size(); ++i) {
+      const uint32_t p = points_.pixel[i];
+      light[p] += radiance_[i];
+      counts[p] += Vec3f{static_cast<float>(counts_[i].clusters), static_cast<float>(counts_[i].rays),
+                         static_cast<float>(counts_[i].bounds)};
+    }
+    const float scale = 1.0f / static_cast<float>(options_.samples);
+    for (size_t p = 0; p < pixels_.size(); ++p) {
+      const auto [x, y] = pixels_[p];
+      const PixelSums& s = sums_[p];
+      film.set(Channel::radiance, x, y, (s.radiance + light[p]) * scale);
+      film.set(Channel::alpha, x, y, s.hits * scale);
+      film.set(Channel::depth, x, y, s.depth);
+      film.set(Channel::normal, x, y, normalize(s.normal));
+      film.set(Channel::albedo, x, y, s.albedo * scale);
+      film.set(Channel::position, x, y, s.position);
+      film.set(Channel::cut_size, x, y, counts[p].x * scale);
+      film.set(Channel::rays, x, y, counts[p].y * scale);
+      film.set(Channel::bounds, x, y, counts[p].z * scale);
+    }
+  }
+
+  const std::vector<Rect>& tiles() const { return tiles_; }
+  size_t pixel_count() const { return pixels_.size(); }
+
+ private:
+  struct Pixel {
+    uint32_t x, y;
+  };
+  const Scene& scene_;
+  const FrameOptions& options_;
+  std::vector<Rect> tiles_;
+  std::vector<Pixel> pixels_;
+  std::vector<PixelSums> sums_;
+  std::vector<RayHit> rays_;
+  ShadePoints points_;
+  std::vector<Rgb> radiance_;
+  std::vector<PointCounts> counts_;
+};
+
+}  // namespace
+
+std::vector<Rect> frame_tiles(const FrameOptions& options) {
+  std::vector<Rect> tiles;
+  const Rect& c = options.crop;
+  for (uint32_t y = c.y0; y < c.y1; y += options.tile_size)
+    for (uint32_t x = c.x0; x < c.x1; x += options.tile_size)
+      tiles.push_back({x, y, std::min(c.x1, x + options.tile_size), std::min(c.y1, y + options.tile_size)});
+  return tiles;
+}
+
+void render_frame(const Scene& scene, const Integrator& integrator, const FrameOptions& options, Film& film,
+                  ShadeContext context, const std::function<void(const Rect&)>& tile_done) {
+  const std::vector<Rect> tiles = frame_tiles(options);
+  // Batches hold consecutive tiles, and depend on the integrator's wish alone: never on the number of threads.
+  std::vector<std::pair<size_t, size_t>> batches;
+  for (size_t first = 0; first < tiles.size();) {
+    size_t last = first, points = 0;
+    while (last < tiles.size() && (last == first || points < integrator.batch_size())) {
+      points += size_t{tiles[last].width()} * tiles[last].height() * options.samples;
+      ++last;
+    }
+    batches.emplace_back(first, last);
+    first = last;
+  }
+  context.progress.begin("render", size_t{options.crop.width()} * options.crop.height());
+  tbb::parallel_for(
+      tbb::blocked_range<size_t>(0, batches.size(), 1),
+      [&](const tbb::blocked_range<size_t>& range) {
+        for (size_t b = range.begin(); b < range.end(); ++b) {
+          context.progress.check();
+          Batch batch(scene, options);
+          for (size_t t = batches[b].first; t < batches[b].second; ++t) batch.add_tile(tiles[t]);
+          batch.collect();
+          batch.shade(integrator, context);
+          context.progress.check();
+          batch.write(film);
+          context.progress.advance(batch.pixel_count());
+          for (const Rect& tile : batch.tiles()) tile_done(tile);
+        }
+      },
+      tbb::simple_partitioner());
+}
+
+}  // namespace lumicut

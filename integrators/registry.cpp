@@ -1,0 +1,30 @@
+#include "integrators/integrator.h"
+
+namespace lumicut {
+
+#define LUMICUT_INTEGRATOR(name) extern const IntegratorEntry name##_integrator;
+#include "integrators/integrator_list.inc"
+#undef LUMICUT_INTEGRATOR
+
+std::span<const IntegratorEntry> integrators() {
+  static const IntegratorEntry table[] = {
+#define LUMICUT_INTEGRATOR(name) name##_integrator,
+#include "integrators/integrator_list.inc"
+#undef LUMICUT_INTEGRATOR
+  };
+  return table;
+}
+
+const IntegratorEntry* find_integrator(const std::string& id) {
+  for (const IntegratorEntry& e : integrators())
+    if (id == e.id) return &e;
+  return nullptr;
+}
+
+std::vector<ParamInfo> all_params(const IntegratorEntry& entry) {
+  std::vector<ParamInfo> table = common_params();
+  for (const ParamInfo& p : entry.params()) table.push_back(p);
+  return table;
+}
+
+}  // namespace lumicut
