@@ -1,0 +1,199 @@
+// The policies of boxes and of balls.
+#include "accel/agglomerate.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "accel/agglomerate.cpp"
+#include <hwy/foreach_target.h>
+// foreach_target comes first.
+#include <hwy/highway.h>
+
+#include "accel/agglomerate-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace lumicut {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// d = half the surface area of the joint box. Features: -lo, hi.
+struct AreaPolicy {
+  static constexpr bool kNonDecreasing = true;
+  static constexpr int kFeatures = 6;
+  static constexpr int kOrderDims = 3;
+  size_t features() const { return 6; }
+  size_t key_features() const { return 6; }
+  void merge(const float* a, const float* b, float* out) const {
+    for (int f = 0; f < 6; ++f) out[f] = std::max(a[f], b[f]);
+  }
+  void order_point(const float* a, float* point) const {
+    for (int axis = 0; axis < 3; ++axis) point[axis] = a[3 + axis] - a[axis];  // twice the centre
+  }
+  template <class D>
+  struct Query {
+    hn::Vec<D> f[6];
+  };
+  template <class D>
+  HWY_INLINE Query<D> query(D d, const float* a) const {
+    return {
+        {hn::Set(d, a[0]), hn::Set(d, a[1]), hn::Set(d, a[2]), hn::Set(d, a[3]), hn::Set(d, a[4]), hn::Set(d, a[5])}};
+  }
+  template <class D>
+  HWY_INLINE hn::Vec<D> cost(D d, const Query<D>& a, const float* b) const {
+    const auto x = hn::Add(hn::Max(a.f[0], hn::Load(d, b)), hn::Max(a.f[3], hn::Load(d, b + 24)));
+    const auto y = hn::Add(hn::Max(a.f[1], hn::Load(d, b + 8)), hn::Max(a.f[4], hn::Load(d, b + 32)));
+    const auto z = hn::Add(hn::Max(a.f[2], hn::Load(d, b + 16)), hn::Max(a.f[5], hn::Load(d, b + 40)));
+    return hn::Add(hn::Mul(x, hn::Add(y, z)), hn::Mul(y, z));
+  }
+};
+
+// d = radius of the smallest ball around both: (|c1 - c2| + r1 + r2) / 2, or the greater radius where one holds the
+// other. Features: centre, -centre, radius. Unlike the others, a merged centre may move either way: each feature alone
+// may fall, and the bound still holds, as it takes the least of each feature over clusters that are there. Eq. 1 holds
+// of balls since the ball of A∪C holds the ball of A; rounding could break it, and a merged radius is rounded up to
+// keep it.
+struct BallPolicy {
+  static constexpr bool kNonDecreasing = true;
+  static constexpr int kFeatures = 0;
+  static constexpr int kOrderDims = 8;  // the first eight dimensions; more would order little better
+  int dimension;
+  size_t features() const { return static_cast<size_t>(2 * dimension + 1); }
+  size_t key_features() const { return features(); }
+  void merge(const float* a, const float* b, float* out) const {
+    const int n = dimension;
+    const double ra = a[2 * n], rb = b[2 * n];
+    double dist2 = 0;
+    for (int i = 0; i < n; ++i) dist2 += (double{a[i]} - b[i]) * (double{a[i]} - b[i]);
+    const double dist = std::sqrt(dist2);
+    // Equal balls are the same from either side: the greater by value, then by features.
+    const bool a_holds = dist + rb <= ra, b_holds = dist + ra <= rb;
+    if (a_holds || b_holds) {
+      const bool take_a = a_holds && !(b_holds && std::lexicographical_compare(a, a + 2 * n + 1, b, b + 2 * n + 1));
+      std::copy_n(take_a ? a : b, 2 * n + 1, out);
+      return;
+    }
+    const double r = 0.5 * (dist + ra + rb);
+    double reach_a = 0, reach_b = 0;
+    for (int i = 0; i < n; ++i) {
+      const double along_a = (r - ra) / dist, along_b = (r - rb) / dist;
+      // Symmetric in a and b, so that the order of a merge changes nothing.
+      const double c = 0.5 * ((a[i] + (double{b[i]} - a[i]) * along_a) + (b[i] + (double{a[i]} - b[i]) * along_b));
+      out[i] = static_cast<float>(c);
+      out[n + i] = -out[i];
+      reach_a += (out[i] - double{a[i]}) * (out[i] - double{a[i]});
+      reach_b += (out[i] - double{b[i]}) * (out[i] - double{b[i]});
+    }
+    const double reach = std::max(std::sqrt(reach_a) + ra, std::sqrt(reach_b) + rb);
+    out[2 * n] = std::nextafter(static_cast<float>(reach), std::numeric_limits<float>::infinity());
+  }
+  void order_point(const float* a, float* point) const {
+    for (int i = 0; i < kOrderDims; ++i) point[i] = i < dimension ? a[i] : 0.0f;
+  }
+  template <class D>
+  struct Query {
+    const float* a;
+  };
+  template <class D>
+  HWY_INLINE Query<D> query(D, const float* a) const {
+    return {a};
+  }
+  template <class D>
+  HWY_INLINE hn::Vec<D> cost(D d, const Query<D>& query, const float* b) const {
+    const float* a = query.a;
+    const int n = dimension;
+    auto dist2 = hn::Zero(d);
+    for (int i = 0; i < n; ++i) {
+      const auto above = hn::Sub(hn::Load(d, b + 8 * i), hn::Set(d, a[i]));
+      const auto below = hn::Sub(hn::Load(d, b + 8 * (n + i)), hn::Set(d, a[n + i]));
+      const auto apart = hn::Max(hn::Max(above, below), hn::Zero(d));
+      dist2 = hn::Add(dist2, hn::Mul(apart, apart));
+    }
+    const auto ra = hn::Set(d, a[2 * n]), rb = hn::Load(d, b + 8 * (2 * n));
+    const auto both = hn::Mul(hn::Add(hn::Sqrt(dist2), hn::Add(ra, rb)), hn::Set(d, 0.5f));
+    return hn::Max(both, hn::Max(ra, rb));
+  }
+};
+
+std::vector<Merge> boxes(std::span<const Aabb> input, float scale, float inflate, Strategy strategy,
+                         Progress* progress) {
+  const AreaPolicy policy;
+  agglomeration::Core<AreaPolicy> core(policy, input.size(), strategy == Strategy::parallel, progress);
+  for (size_t i = 0; i < input.size(); ++i) {
+    float* f = core.leaf(i);
+    for (int axis = 0; axis < 3; ++axis) {
+      f[axis] = -(input[i].lo[axis] * scale);
+      f[3 + axis] = input[i].hi[axis] * scale + inflate;
+    }
+  }
+  return core.run(strategy);
+}
+
+std::vector<Merge> balls(std::span<const float> centres, std::span<const float> radii, int dimension, Strategy strategy,
+                         Progress* progress) {
+  const BallPolicy policy{dimension};
+  agglomeration::Core<BallPolicy> core(policy, radii.size(), strategy == Strategy::parallel, progress);
+  for (size_t i = 0; i < radii.size(); ++i) {
+    float* f = core.leaf(i);
+    for (int a = 0; a < dimension; ++a) {
+      f[a] = centres[i * static_cast<size_t>(dimension) + static_cast<size_t>(a)];
+      f[dimension + a] = -f[a];
+    }
+    f[2 * dimension] = radii[i];
+  }
+  return core.run(strategy);
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace lumicut
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace lumicut {
+
+HWY_EXPORT(boxes);
+HWY_EXPORT(balls);
+
+std::vector<Merge> agglomerate_boxes(std::span<const Aabb> input, Strategy strategy, Progress* progress) {
+  if (input.size() >= 0x7fffffffu) throw Error(ErrorCode::unsupported, "agglomerate: more than 2^31 boxes");
+  Aabb all;
+  for (size_t i = 0; i < input.size(); ++i) {
+    const Aabb& b = input[i];
+    // NaN fails too.
+    if (b.empty() || !(max_component(max(-b.lo, b.hi)) < 1e19f))
+      fail_argument("agglomerate_boxes: box " + std::to_string(i) + " is empty, not finite, or reaches past 1e19");
+    all.extend(b);
+  }
+  const float size = input.empty() ? 0.0f : max_component(all.extent());
+  // A power of two: keeps every digit, and products of three sides in range.
+  const float scale = size > 1e-30f ? std::exp2(-std::floor(std::log2(size))) : 1.0f;
+  return HWY_DYNAMIC_DISPATCH(boxes)(input, scale, 1e-7f, strategy, progress);
+}
+
+std::vector<Merge> agglomerate_balls(std::span<const float> centres, std::span<const float> radii, int dimension,
+                                     Strategy strategy, Progress* progress) {
+  if (dimension < 1 || dimension > 16)
+    fail_argument("agglomerate_balls: dimension is " + std::to_string(dimension) + ", not 1 to 16");
+  if (centres.size() != radii.size() * static_cast<size_t>(dimension))
+    fail_argument("agglomerate_balls: " + std::to_string(centres.size()) + " coordinates for " +
+                  std::to_string(radii.size()) + " balls of dimension " + std::to_string(dimension));
+  if (radii.size() >= 0x7fffffffu) throw Error(ErrorCode::unsupported, "agglomerate: more than 2^31 balls");
+  for (size_t i = 0; i < centres.size(); ++i)
+    if (!(std::abs(centres[i]) < 1e18f))
+      fail_argument("agglomerate_balls: centres[" + std::to_string(i) + "] is " + std::to_string(centres[i]));
+  for (size_t i = 0; i < radii.size(); ++i)
+    if (!(radii[i] >= 0.0f && radii[i] < 1e18f))
+      fail_argument("agglomerate_balls: radii[" + std::to_string(i) + "] is " + std::to_string(radii[i]));
+  return HWY_DYNAMIC_DISPATCH(balls)(centres, radii, dimension, strategy, progress);
+}
+
+Strategy strategy_of(const std::string& name) {
+  if (name == "naive") return Strategy::naive;
+  if (name == "heap") return Strategy::heap;
+  if (name == "local") return Strategy::locally_ordered;
+  if (name == "parallel") return Strategy::parallel;
+  fail_argument("strategy '" + name + "' is none of naive, heap, local, parallel");
+}
+
+}  // namespace lumicut
+#endif  // HWY_ONCE
