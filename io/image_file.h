@@ -1,0 +1,39 @@
+// Images on disk: multi-layer EXR through OpenEXR, PNG through OpenImageIO. Writing is atomic.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace lumicut::io {
+
+struct ImageLayer {
+  std::string name;           // "radiance", "depth", "normal", "albedo", "cut_size" ...
+  int components = 3;         // 1 or 3
+  std::vector<float> pixels;  // interleaved, rows from the top
+};
+
+// The window is what was rendered: x0, y0 are its place in the whole frame.
+struct Image {
+  int width = 0, height = 0;
+  int x0 = 0, y0 = 0, frame_width = 0, frame_height = 0;  // frame 0: the window is the frame
+  std::vector<ImageLayer> layers;
+  std::map<std::string, std::string> attributes;  // strings of the header
+
+  const ImageLayer* find(const std::string& name) const;
+};
+
+// Channels: radiance is R, G, B (the default layer); alpha is A; depth is Z; normal is N.X, N.Y, N.Z; other layers are
+// name.R, name.G, name.B, or name.V when they have one component. ZIP compression; 32-bit float, or 16 with `half`
+// (values beyond 65504 are cut to it). Attributes are written as "lumicut:<key>". Throws FileError.
+void write_exr(const std::string& path, const Image& image, bool half);
+
+// Reads any scanline or tiled EXR back, with the names above. A file with a single Y channel gives radiance of equal
+// components. Throws FileError.
+Image read_exr(const std::string& path);
+
+// 8 bits a channel, rows from the top; components 1 or 3. Throws FileError.
+void write_png(const std::string& path, const std::vector<uint8_t>& pixels, int width, int height, int components);
+
+}  // namespace lumicut::io

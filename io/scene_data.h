@@ -1,0 +1,57 @@
+// A scene as read from files, ready to be handed to the library: all in world space, linear colour, radians.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lumicut/lumicut.h"
+
+namespace lumicut::io {
+
+struct Texture {
+  std::string file;
+  uint32_t width = 0, height = 0, channels = 0;  // channels 1 or 3
+  uint32_t flags = 0;                            // LUMICUT_SRGB ...
+  std::vector<uint8_t> bytes;                    // of integer images, else
+  std::vector<float> floats;                     // row 0 is the top
+};
+
+struct Material {
+  std::string name;
+  lumicut_material values;  // texture numbers are 1 + index into SceneData::textures
+};
+
+struct Mesh {
+  std::string name;
+  std::vector<float> positions, normals, uvs;  // normals, uvs: empty, or one a vertex
+  std::vector<uint32_t> indices;
+  std::vector<uint32_t> materials;  // one a triangle, index into SceneData::materials
+  std::vector<float> transforms;    // twelve an instance; empty: one, as it is
+  uint32_t group = 0;
+};
+
+struct SceneData {
+  std::vector<Texture> textures;
+  std::vector<Material> materials;
+  std::vector<Mesh> meshes;
+  std::vector<lumicut_light> lights;
+  std::optional<lumicut_environment> environment;
+  lumicut_camera camera{};
+  uint32_t width = 512, height = 512, samples = 1;  // what the scene file proposes
+  std::vector<std::string> warnings;                // what is approximated or looks wrong
+
+  uint64_t triangle_count() const {
+    uint64_t n = 0;
+    for (const auto& mesh : meshes) n += mesh.indices.size() / 3;
+    return n;
+  }
+};
+
+// Opacity of what is not there: the ABI reads 0 as "not given".
+inline constexpr float kHole = 1e-3f;
+
+lumicut_material default_material();  // grey .5, no gloss
+
+}  // namespace lumicut::io

@@ -1,0 +1,611 @@
+#include "io/scene_json.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+
+#include "io/file_error.h"
+#include "io/json_reader.h"
+#include "io/scene_obj.h"
+#include "io/texture_store.h"
+
+namespace lumicut::io {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr uint64_t kMaxSceneBytes = uint64_t{1} << 30;
+constexpr double kMaxCoordinate = 1e30;  // squares of differences must stay finite... in the library's floats
+
+using Vec = std::array<double, 3>;
+
+Vec operator+(const Vec& a, const Vec& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+Vec operator-(const Vec& a, const Vec& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+Vec operator*(const Vec& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
+double dot(const Vec& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vec cross(const Vec& a, const Vec& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+double length(const Vec& a) { return std::sqrt(dot(a, a)); }
+
+void store(float* out, const Vec& v) {
+  for (size_t k = 0; k < 3; ++k) out[k] = static_cast<float>(v[k]);
+}
+
+double radians(double degrees) { return degrees * kPi / 180.0; }
+
+// Row-major 3x4.
+using Matrix = std::array<double, 12>;
+constexpr Matrix kIdentity = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+
+Matrix multiply(const Matrix& a, const Matrix& b) {
+  Matrix m{};
+  for (size_t r = 0; r < 3; ++r)
+    for (size_t c = 0; c < 4; ++c) {
+      m[r * 4 + c] = c == 3 ? a[r * 4 + 3] : 0.0;
+      for (size_t k = 0; k < 3; ++k) m[r * 4 + c] += a[r * 4 + k] * b[k * 4 + c];
+    }
+  return m;
+}
+
+Matrix rotation(const Vec& axis, double angle) {
+  const double c = std::cos(angle), s = std::sin(angle), t = 1 - c;
+  const auto [x, y, z] = axis;
+  return {t * x * x + c,     t * x * y - s * z, t * x * z + s * y, 0,
+          t * x * y + s * z, t * y * y + c,     t * y * z - s * x, 0,
+          t * x * z - s * y, t * y * z + s * x, t * z * z + c,     0};
+}
+
+class SceneReader {
+ public:
+  explicit SceneReader(const std::string& path) : path_(path), textures_(scene_.textures) {}
+
+  SceneData read() {
+    const auto json = parse_json(read_whole_file(path_, kMaxSceneBytes), path_);
+    JsonObject root(JsonValue(json, path_, ""));
+    root.text("description", "");
+    z_up_ = (root.has("up") ? root.need("up").choice({"y", "z"}) : 0) == 1;
+    scale_ = root.number("unit_scale", 1.0, 1e-12, 1e12);
+    if (auto image = root.find("image")) read_image(*image);
+    read_camera(root.need("camera"));
+    if (auto materials = root.find("materials")) read_materials(*materials);
+    if (auto meshes = root.find("meshes"))
+      for (const auto& mesh : meshes->elements()) read_mesh(mesh);
+    if (auto lights = root.find("lights"))
+      for (const auto& light : lights->elements()) read_light(light);
+    if (auto environment = root.find("environment")) read_environment(*environment);
+    root.finish();
+    if (scene_.meshes.empty()) root.value().fail("has neither meshes nor visible lights: there is nothing to see");
+    check_lit(root);
+    return std::move(scene_);
+  }
+
+ private:
+  // ---- Paths ----
+
+  // ${NAME} stands for the environment's variable; relative paths start at the scene's folder.
+  std::string resolve(const JsonValue& value) const {
+    std::string text = value.text();
+    if (text.empty()) value.fail("is empty, but must be a path");
+    for (size_t at; (at = text.find("${")) != std::string::npos;) {
+      const size_t end = text.find('}', at);
+      if (end == std::string::npos) value.fail_expected("a path in which every ${ is closed by }");
+      const std::string name = text.substr(at + 2, end - at - 2);
+      const char* found = std::getenv(name.c_str());
+      std::string replacement = found ? found : "";
+      if (replacement.empty() && name == "LUMICUT_SCENES") replacement = default_meshes(value);
+      if (replacement.empty()) value.fail(fmt::format("the environment variable {} is not set", name));
+      if (replacement.find("${") != std::string::npos)
+        value.fail(fmt::format("the environment variable {} holds ${{", name));
+      text = text.substr(0, at) + replacement + text.substr(end + 1);
+    }
+    const fs::path path(text);
+    return path.is_absolute() ? text : (fs::path(path_).parent_path() / path).lexically_normal().string();
+  }
+
+  // The nearest folder shared/scenes beside one of the folders that hold the scene file.
+  std::string default_meshes(const JsonValue& value) const {
+    std::error_code code;
+    for (fs::path folder = fs::absolute(path_).lexically_normal().parent_path();; folder = folder.parent_path()) {
+      if (fs::is_directory(folder / "shared/scenes", code)) return (folder / "shared/scenes").string();
+      if (folder == folder.root_path()) break;
+    }
+    value.fail("LUMICUT_SCENES is not set, and there is no folder shared/scenes next to this project");
+  }
+
+  // ---- Small parts ----
+
+  Vec point(const JsonValue& value) const { return value.vector3(-kMaxCoordinate, kMaxCoordinate) * scale_; }
+
+  // Scaled like a point, but of its own length.
+  Vec edge(const JsonValue& value) const {
+    const Vec v = value.vector3(-kMaxCoordinate, kMaxCoordinate) * scale_;
+    if (!(length(v) > 0)) value.fail_expected("a vector that is not zero");
+    return v;
+  }
+
+  static Vec direction(const JsonValue& value) {
+    const Vec v = value.vector3(-kMaxCoordinate, kMaxCoordinate);
+    if (!(length(v) > 0)) value.fail_expected("a direction, which is not zero");
+    return v * (1.0 / length(v));
+  }
+
+  static uint32_t group(JsonObject& object) { return static_cast<uint32_t>(object.integer("group", 0, 0, 65535)); }
+
+  Matrix matrix(const JsonValue& value) const {
+    const auto numbers = value.numbers(12, -kMaxCoordinate, kMaxCoordinate);
+    Matrix m{};
+    std::copy(numbers.begin(), numbers.end(), m.begin());
+    return m;
+  }
+
+  // Twelve numbers, or { "scale", "rotate", "translate" } applied in this order.
+  Matrix transform(const JsonValue& value) const {
+    Matrix m = kIdentity;
+    if (value.raw().is_array()) {
+      m = matrix(value);
+    } else {
+      JsonObject object(value);
+      if (auto scale = object.find("scale")) {
+        const Vec s =
+            scale->raw().is_number() ? Vec{scale->number(), scale->number(), scale->number()} : scale->vector3();
+        for (size_t k = 0; k < 3; ++k) m[k * 5] = s[k];
+      }
+      if (auto rotate = object.find("rotate")) {
+        JsonObject turn(*rotate);
+        const Vec axis = direction(turn.need("axis"));
+        m = multiply(rotation(axis, radians(turn.need("degrees").number(-36000, 36000))), m);
+        turn.finish();
+      }
+      if (auto translate = object.find("translate")) {
+        const Vec t = translate->vector3(-kMaxCoordinate, kMaxCoordinate);
+        for (size_t k = 0; k < 3; ++k) m[k * 4 + 3] += t[k];
+      }
+      object.finish();
+    }
+    const Vec x{m[0], m[4], m[8]}, y{m[1], m[5], m[9]}, z{m[2], m[6], m[10]};
+    if (!(std::abs(dot(cross(x, y), z)) > 0)) value.fail("the transform flattens space (its determinant is 0)");
+    return m;
+  }
+
+  // ---- Image and camera ----
+
+  void read_image(const JsonValue& value) {
+    JsonObject image(value);
+    if (auto size = image.find("size")) {
+      const auto elements = size->elements();
+      if (elements.size() != 2) size->fail_expected("[width, height]");
+      scene_.width = static_cast<uint32_t>(elements[0].integer(1, 65536));
+      scene_.height = static_cast<uint32_t>(elements[1].integer(1, 65536));
+    }
+    scene_.samples = static_cast<uint32_t>(image.integer("samples", 1, 1, 65536));
+    image.finish();
+  }
+
+  void read_camera(const JsonValue& value) {
+    JsonObject object(value);
+    lumicut_camera& camera = scene_.camera;
+    camera.struct_size = sizeof(camera);
+    camera.orthographic = object.has("type") && object.need("type").choice({"perspective", "orthographic"}) == 1;
+    Matrix m{};
+    if (auto given = object.find("matrix")) {
+      m = matrix(*given);
+      for (const size_t k : {3u, 7u, 11u}) m[k] *= scale_;
+      const Vec x{m[0], m[4], m[8]}, y{m[1], m[5], m[9]}, z{m[2], m[6], m[10]};
+      if (!(std::abs(dot(cross(x, y), z)) > 0))
+        given->fail("the camera's axes lie in one plane (the determinant is 0)");
+      if (object.has("eye") || object.has("at") || object.has("up"))
+        value.fail("give either \"matrix\" or \"eye\", \"at\", \"up\"");
+    } else {
+      const Vec eye = point(object.need("eye")), at = point(object.need("at"));
+      const Vec up = object.has("up") ? direction(object.need("up")) : (z_up_ ? Vec{0, 0, 1} : Vec{0, 1, 0});
+      const Vec back = eye - at;
+      if (!(length(back) > 0)) object.need("at").fail("is the same point as \"eye\"");
+      const Vec z = back * (1.0 / length(back));
+      Vec x = cross(up, z);
+      if (!(length(x) > 1e-6)) value.fail("looks along its own \"up\"; give another \"up\"");
+      x = x * (1.0 / length(x));
+      const Vec y = cross(z, x);
+      m = {x[0], y[0], z[0], eye[0], x[1], y[1], z[1], eye[1], x[2], y[2], z[2], eye[2]};
+    }
+    for (size_t k = 0; k < 12; ++k) camera.to_world[k] = static_cast<float>(m[k]);
+    if (camera.orthographic) {
+      camera.height = static_cast<float>(object.need("height").number(1e-20, kMaxCoordinate) * scale_);
+    } else {
+      camera.fov_y = static_cast<float>(radians(object.need("fov_y").number(0.001, 179.0)));
+    }
+    if (auto shift = object.find("shift")) {
+      const auto s = shift->numbers(2, -100, 100);
+      camera.shift[0] = static_cast<float>(s[0]), camera.shift[1] = static_cast<float>(s[1]);
+    }
+    camera.near_clip = static_cast<float>(object.number("near", 0, 0, kMaxCoordinate) * scale_);
+    camera.far_clip = static_cast<float>(object.number("far", 0, 0, kMaxCoordinate) * scale_);
+    if (camera.far_clip != 0 && camera.far_clip <= camera.near_clip)
+      value.fail("\"far\" must be beyond \"near\" (or 0: no limit)");
+    camera.pixel_aspect = static_cast<float>(object.number("pixel_aspect", 1, 0.01, 100));
+    camera.lens_radius = static_cast<float>(object.number("lens_radius", 0, 0, kMaxCoordinate) * scale_);
+    camera.focus_distance = static_cast<float>(object.number("focus_distance", 0, 0, kMaxCoordinate) * scale_);
+    if (camera.lens_radius > 0 && !(camera.focus_distance > 0))
+      value.fail("a \"lens_radius\" needs a \"focus_distance\"");
+    object.finish();
+  }
+
+  // ---- Materials ----
+
+  // Changes of `m` that the object's keys ask for.
+  void change_material(JsonObject& object, lumicut_material& m, const std::string& name) {
+    const auto colour = [&](const char* key, float* out, double maximum) {
+      if (auto value = object.find(key)) store(out, value->vector3(0, maximum));
+    };
+    colour("diffuse", m.diffuse, 1);
+    colour("specular", m.specular, 1);
+    colour("emission", m.emission, 1e15);
+    m.shininess = static_cast<float>(object.number("shininess", static_cast<double>(m.shininess), 0, 1e7));
+    if (auto opacity = object.find("opacity")) m.opacity = std::max(kHole, static_cast<float>(opacity->number(0, 1)));
+    if (auto model = object.find("model"))
+      m.flags = (m.flags & ~uint32_t{LUMICUT_PHONG}) |
+                (model->choice({"blinn", "phong"}) == 1 ? uint32_t{LUMICUT_PHONG} : 0u);
+    if (auto both = object.find("emit_both_sides"))
+      m.flags =
+          (m.flags & ~uint32_t{LUMICUT_EMIT_BOTH_SIDES}) | (both->boolean() ? uint32_t{LUMICUT_EMIT_BOTH_SIDES} : 0u);
+    const auto texture = [&](const char* key, int32_t& out, TextureUse use) {
+      const auto value = object.find(key);
+      if (!value) return;
+      out = value->raw().is_null() ? 0
+                                   : textures_.get(resolve(*value), use, 0,
+                                                   fmt::format("material \"{}\" ({}: {})", name, path_, value->path()));
+    };
+    texture("diffuse_texture", m.diffuse_texture, TextureUse::colour);
+    texture("specular_texture", m.specular_texture, TextureUse::colour);
+    texture("opacity_texture", m.opacity_texture, TextureUse::mask);
+    texture("emission_texture", m.emission_texture, TextureUse::colour);
+  }
+
+  void read_materials(const JsonValue& value) {
+    for (const auto& element : value.elements()) {
+      JsonObject object(element);
+      const std::string name = object.need("name").text();
+      if (by_name_.count(name)) object.need("name").fail(fmt::format("a material \"{}\" stands here already", name));
+      lumicut_material m = default_material();
+      change_material(object, m, name);
+      object.finish();
+      by_name_[name] = add_material(name, m);
+    }
+  }
+
+  uint32_t add_material(const std::string& name, const lumicut_material& values) {
+    scene_.materials.push_back({name, values});
+    return static_cast<uint32_t>(scene_.materials.size() - 1);
+  }
+
+  uint32_t material(const JsonValue& value) const {
+    const std::string name = value.text();
+    const auto found = by_name_.find(name);
+    if (found != by_name_.end()) return found->second;
+    std::vector<std::string> names;
+    for (const auto& [known, index] : by_name_) names.push_back(known);
+    const std::string near = nearest_word(name, names);
+    value.fail(fmt::format("no material \"{}\" in \"materials\"{}", name,
+                           near.empty() ? "" : "; did you mean \"" + near + "\"?"));
+  }
+
+  // ---- Meshes ----
+
+  void read_mesh(const JsonValue& value) {
+    JsonObject object(value);
+    const std::string name = object.text("name", "");
+    const Matrix base = object.has("transform") ? transform(object.need("transform")) : kIdentity;
+    std::vector<Matrix> placed;
+    if (auto instances = object.find("instances")) {
+      for (const auto& instance : instances->elements()) placed.push_back(multiply(transform(instance), base));
+      if (placed.empty()) instances->fail("is empty: leave it out for one instance");
+    } else {
+      placed.push_back(base);
+    }
+    const uint32_t light_group = group(object);
+    const size_t first = scene_.meshes.size();
+    if (object.has("obj")) {
+      read_obj_mesh(object);
+    } else if (object.has("positions")) {
+      read_inline_mesh(object);
+    } else {
+      value.fail("needs either \"obj\" (a file) or \"positions\" (with \"triangles\" or \"quads\")");
+    }
+    object.finish();
+    for (size_t i = first; i < scene_.meshes.size(); ++i) {
+      Mesh& mesh = scene_.meshes[i];
+      mesh.name = name.empty() ? value.path() : name;
+      mesh.group = light_group;
+      place(value, mesh, placed);
+    }
+  }
+
+  // One instance is baked into the vertices; more become the mesh's transforms. `unit_scale` goes into the vertices.
+  void place(const JsonValue& value, Mesh& mesh, std::vector<Matrix> placed) {
+    if (placed.size() == 1) {
+      if (placed[0] != kIdentity) bake(value, mesh, placed[0]);
+    } else {
+      for (auto& m : placed) {
+        for (const size_t k : {3u, 7u, 11u}) m[k] *= scale_;
+        for (const double number : m) mesh.transforms.push_back(checked(value, number));
+      }
+    }
+    if (scale_ != 1.0)
+      for (float& x : mesh.positions) x = checked(value, double{x} * scale_);
+  }
+
+  static float checked(const JsonValue& value, double number) {
+    const auto result = static_cast<float>(number);
+    if (!(std::abs(result) <= static_cast<float>(kMaxCoordinate)))
+      value.fail("its transform carries it beyond the range of float");
+    return result;
+  }
+
+  static void bake(const JsonValue& value, Mesh& mesh, const Matrix& m) {
+    const auto apply = [&](const std::array<double, 9>& r, const Vec& t, float* p) {
+      const Vec v{p[0], p[1], p[2]};
+      for (size_t k = 0; k < 3; ++k)
+        p[k] = checked(value, r[k * 3] * v[0] + r[k * 3 + 1] * v[1] + r[k * 3 + 2] * v[2] + t[k]);
+    };
+    for (size_t i = 0; i + 2 < mesh.positions.size(); i += 3)
+      apply({m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]}, {m[3], m[7], m[11]}, &mesh.positions[i]);
+    // Normals map by the inverse transpose, which is the cofactor matrix up to the determinant; a mirror flips the
+    // winding.
+    const Vec c0{m[0], m[4], m[8]}, c1{m[1], m[5], m[9]}, c2{m[2], m[6], m[10]};
+    const double determinant = dot(cross(c0, c1), c2);
+    const double sign = determinant < 0 ? -1 : 1;
+    const Vec n0 = cross(c1, c2) * sign, n1 = cross(c2, c0) * sign, n2 = cross(c0, c1) * sign;
+    for (size_t i = 0; i + 2 < mesh.normals.size(); i += 3) {
+      float* n = &mesh.normals[i];
+      const Vec turned = n0 * double{n[0]} + n1 * double{n[1]} + n2 * double{n[2]};
+      const double l = length(turned);
+      if (l > 0) store(n, turned * (1.0 / l));
+    }
+    if (determinant < 0)
+      for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3) std::swap(mesh.indices[i + 1], mesh.indices[i + 2]);
+  }
+
+  void read_obj_mesh(JsonObject& object) {
+    const std::string file = resolve(object.need("obj"));
+    const auto one = object.find("material");
+    const auto changes = object.find("materials");
+    if (one && changes) object.value().fail("give either \"material\" (for all) or \"materials\" (by name)");
+    ObjModel model = read_obj(file, {.read_materials = !one}, textures_);
+    scene_.warnings.insert(scene_.warnings.end(), model.warnings.begin(), model.warnings.end());
+    std::vector<uint32_t> numbers;
+    if (one) {
+      numbers.push_back(material(*one));
+    } else {
+      numbers = obj_materials(model, changes, file);
+    }
+    for (auto& mesh : model.meshes) {
+      for (auto& m : mesh.materials) m = numbers[m];
+      scene_.meshes.push_back(std::move(mesh));
+    }
+  }
+
+  std::vector<uint32_t> obj_materials(const ObjModel& model, const std::optional<JsonValue>& changes,
+                                      const std::string& file) {
+    std::optional<JsonObject> object;
+    if (changes) object.emplace(*changes);
+    std::vector<uint32_t> numbers;
+    std::vector<std::string> names;
+    for (const auto& m : model.materials) names.push_back(m.name);
+    if (object)
+      for (const auto& item : changes->raw().items())
+        if (std::find(names.begin(), names.end(), item.key()) == names.end()) {
+          const std::string near = nearest_word(item.key(), names);
+          changes->fail(fmt::format("{} has no material \"{}\"{}", file, item.key(),
+                                    near.empty() ? "" : "; did you mean \"" + near + "\"?"));
+        }
+    for (const auto& m : model.materials) {
+      const auto change = object && !m.name.empty() ? object->find(m.name) : std::nullopt;
+      if (change && change->raw().is_string()) {
+        numbers.push_back(material(*change));
+        continue;
+      }
+      lumicut_material values = m.values;
+      if (change) {
+        JsonObject keys(*change);
+        change_material(keys, values, m.name);
+        keys.finish();
+      }
+      numbers.push_back(add_material(m.name, values));
+    }
+    return numbers;
+  }
+
+  void read_inline_mesh(JsonObject& object) {
+    Mesh mesh;
+    const auto append = [](const JsonValue& list, std::vector<float>& out, size_t count) {
+      for (const auto& element : list.elements())
+        for (const double x : element.numbers(count, -kMaxCoordinate, kMaxCoordinate))
+          out.push_back(static_cast<float>(x));
+    };
+    append(object.need("positions"), mesh.positions, 3);
+    const auto vertices = static_cast<int64_t>(mesh.positions.size() / 3);
+    if (vertices == 0) object.need("positions").fail("is empty");
+    const auto per_vertex = [&](const char* key, std::vector<float>& out, size_t count) {
+      const auto list = object.find(key);
+      if (!list) return;
+      append(*list, out, count);
+      if (static_cast<int64_t>(out.size() / count) != vertices)
+        list->fail(fmt::format("has {} entries for {} positions", out.size() / count, vertices));
+    };
+    per_vertex("normals", mesh.normals, 3);
+    per_vertex("uvs", mesh.uvs, 2);
+    for (size_t i = 0; i + 2 < mesh.normals.size(); i += 3) {
+      const Vec n{mesh.normals[i], mesh.normals[i + 1], mesh.normals[i + 2]};
+      if (!(length(n) > 0)) object.need("normals").fail(fmt::format("[{}] is zero", i / 3));
+      store(&mesh.normals[i], n * (1.0 / length(n)));
+    }
+    const auto faces = [&](const char* key, size_t corners) {
+      const auto list = object.find(key);
+      if (!list) return;
+      for (const auto& face : list->elements()) {
+        const auto elements = face.elements();
+        if (elements.size() != corners) face.fail_expected(fmt::format("an array of {} vertex numbers", corners));
+        std::array<uint32_t, 4> v{};
+        for (size_t k = 0; k < corners; ++k) v[k] = static_cast<uint32_t>(elements[k].integer(0, vertices - 1));
+        mesh.indices.insert(mesh.indices.end(), {v[0], v[1], v[2]});
+        if (corners == 4) mesh.indices.insert(mesh.indices.end(), {v[0], v[2], v[3]});
+      }
+    };
+    faces("triangles", 3);
+    faces("quads", 4);
+    if (mesh.indices.empty()) object.value().fail("has no \"triangles\" and no \"quads\"");
+    mesh.materials.assign(mesh.indices.size() / 3, material(object.need("material")));
+    scene_.meshes.push_back(std::move(mesh));
+  }
+
+  // ---- Lights ----
+
+  void read_light(const JsonValue& value) {
+    JsonObject object(value);
+    lumicut_light light{};
+    light.struct_size = sizeof(light);
+    light.type = static_cast<uint32_t>(object.need("type").choice({"point", "spot", "rectangle", "disk", "sun"}));
+    light.unit = static_cast<uint32_t>(object.has("unit") ? object.need("unit").choice({"radiometric", "watt"}) : 0);
+    light.group = group(object);
+    store(light.color, object.vector3("color", {1, 1, 1}, 0, 1e15));
+    light.value = static_cast<float>(object.need("value").number(0, 1e20));
+    if (light.type == LUMICUT_SUN) {
+      store(light.direction, direction(object.need("direction")));
+      light.radius = static_cast<float>(radians(object.number("angular_radius", 0, 0, 90)));
+    } else if (light.type == LUMICUT_POINT || light.type == LUMICUT_SPOT) {
+      store(light.position, point(object.need("position")));
+      light.radius = static_cast<float>(object.number("radius", 0, 0, kMaxCoordinate) * scale_);
+      if (light.type == LUMICUT_SPOT) {
+        store(light.direction, direction(object.need("direction")));
+        light.angle = static_cast<float>(radians(object.need("angle").number(0.01, 360)));
+        light.blend = static_cast<float>(object.number("blend", 0, 0, 1));
+        light.spot_cosine = object.boolean("cosine", false);
+      }
+    } else {
+      read_area_light(object, light);
+      return;
+    }
+    object.finish();
+    scene_.lights.push_back(light);
+  }
+
+  void read_area_light(JsonObject& object, lumicut_light& light) {
+    const Vec u = edge(object.need("u")), v = edge(object.need("v"));
+    const double area = length(cross(u, v));
+    if (!(area > 1e-9 * length(u) * length(v))) object.need("v").fail("is parallel to \"u\"");
+    Vec centre{};
+    if (auto corner = light.type == LUMICUT_RECTANGLE ? object.find("corner") : std::nullopt) {
+      if (object.has("position")) corner->fail("give either \"position\" (the centre) or \"corner\"");
+      centre = point(*corner) + (u + v) * 0.5;
+    } else {
+      centre = point(object.need("position"));
+    }
+    store(light.position, centre), store(light.u, u), store(light.v, v);
+    const auto spread = object.find("spread");
+    light.spread = spread ? static_cast<float>(radians(spread->number(0.1, 180))) : 0.0f;
+    const bool visible = object.boolean("visible", false);
+    if (visible && spread && light.spread < static_cast<float>(kPi) - 1e-6f)
+      spread->fail("a visible light is Lambertian: leave \"spread\" out");
+    object.finish();
+    if (visible) {
+      add_visible_light(object, light, centre, u, v);
+    } else {
+      scene_.lights.push_back(light);
+    }
+  }
+
+  // A mesh that emits from its front, blocks light and reflects nothing.
+  void add_visible_light(JsonObject& object, const lumicut_light& light, const Vec& centre, const Vec& u,
+                         const Vec& v) {
+    Mesh mesh;
+    mesh.name = object.value().path();
+    mesh.group = light.group;
+    const auto add = [&](const Vec& p) {
+      for (const double x : p) mesh.positions.push_back(static_cast<float>(x));
+    };
+    double area = length(cross(u, v));
+    if (light.type == LUMICUT_RECTANGLE) {
+      const Vec corner = centre - (u + v) * 0.5;
+      add(corner), add(corner + u), add(corner + u + v), add(corner + v);
+      mesh.indices = {0, 1, 2, 0, 2, 3};
+    } else {  // a polygon of the ellipse's area
+      constexpr uint32_t kCorners = 64;
+      const double step = 2 * kPi / kCorners;
+      area *= kPi / 4;
+      const double grow = std::sqrt(step / std::sin(step));
+      for (uint32_t i = 0; i < kCorners; ++i)
+        add(centre + (u * std::cos(i * step) + v * std::sin(i * step)) * (0.5 * grow));
+      for (uint32_t i = 1; i + 1 < kCorners; ++i) mesh.indices.insert(mesh.indices.end(), {0, i, i + 1});
+    }
+    lumicut_material m = default_material();
+    const double radiance = double{light.value} * (light.unit == LUMICUT_WATT ? 1.0 / (kPi * area) : 1.0);
+    for (int c = 0; c < 3; ++c) {
+      m.diffuse[c] = 0;
+      m.emission[c] = static_cast<float>(double{light.color[c]} * radiance);
+    }
+    mesh.materials.assign(mesh.indices.size() / 3, add_material("light " + mesh.name, m));
+    scene_.meshes.push_back(std::move(mesh));
+  }
+
+  void read_environment(const JsonValue& value) {
+    JsonObject object(value);
+    lumicut_environment environment{};
+    environment.struct_size = sizeof(environment);
+    environment.group = group(object);
+    const double strength = object.number("strength", 1, 0, 1e15);
+    store(environment.color, object.vector3("color", {1, 1, 1}, 0, 1e15) * strength);
+    if (auto image = object.find("image"))
+      environment.texture =
+          textures_.get(resolve(*image), TextureUse::radiance, 0, fmt::format("the environment ({})", path_));
+    // World to map: its up axis becomes z; with y up, x stays x, and -z becomes y.
+    const double angle = radians(object.number("rotation", 0, -36000, 36000));
+    const double c = std::cos(angle), s = std::sin(angle);
+    const std::array<double, 9> turn = {c, s, 0, -s, c,
+                                        0, 0, 0, 1};  // the map turns by `angle`, so the world by minus it
+    const std::array<double, 9> stand =
+        z_up_ ? std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1} : std::array<double, 9>{1, 0, 0, 0, 0, -1, 0, 1, 0};
+    for (size_t i = 0; i < 3; ++i)
+      for (size_t j = 0; j < 3; ++j) {
+        double sum = 0;
+        for (size_t k = 0; k < 3; ++k) sum += turn[i * 3 + k] * stand[k * 3 + j];
+        environment.world_to_map[i * 3 + j] = static_cast<float>(sum);
+      }
+    object.finish();
+    scene_.environment = environment;
+  }
+
+  // A scene without light renders black, which is legal and seldom meant.
+  void check_lit(const JsonObject&) {
+    bool lit = !scene_.lights.empty() || scene_.environment.has_value();
+    for (const auto& m : scene_.materials)
+      lit = lit || m.values.emission[0] + m.values.emission[1] + m.values.emission[2] > 0;
+    if (!lit) scene_.warnings.push_back(path_ + ": has no light at all; the image will be black");
+  }
+
+  std::string path_;
+  SceneData scene_;
+  TextureStore textures_;
+  std::map<std::string, uint32_t> by_name_;
+  bool z_up_ = false;
+  double scale_ = 1;
+};
+
+}  // namespace
+
+lumicut_material default_material() {
+  lumicut_material m{};
+  m.struct_size = sizeof(m);
+  m.opacity = 1;
+  m.shininess = 1;
+  for (float& c : m.diffuse) c = 0.5f;
+  return m;
+}
+
+SceneData read_scene(const std::string& path) { return SceneReader(path).read(); }
+
+}  // namespace lumicut::io

@@ -1,0 +1,15 @@
+// From what was read to what the library renders.
+#pragma once
+
+#include <cstdint>
+
+#include "io/library.h"
+#include "io/scene_data.h"
+
+namespace lumicut::io {
+
+// Hands everything to `scene` (textures, materials, meshes, lights, environment, camera). Does not commit.
+// Throws LibraryError naming the part that the library refused.
+void upload_scene(const Api& api, lumicut_scene scene, const SceneData& data);
+
+}  // namespace lumicut::io

@@ -1,0 +1,29 @@
+// Textures read once however often they are used.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "io/scene_data.h"
+
+namespace lumicut::io {
+
+enum class TextureUse {
+  colour,   // integer images hold sRGB, float images linear values; grey or red, green and blue
+  mask,     // one linear channel: the alpha of images that have one, else the first channel
+  radiance  // an environment: linear floats, finite and not negative
+};
+
+class TextureStore {
+ public:
+  explicit TextureStore(std::vector<Texture>& textures) : textures_(textures) {}
+  // 1 + index into the textures. `user` names who asks, for the error: "material \"leaf\"". Throws FileError.
+  int32_t get(const std::string& path, TextureUse use, uint32_t flags, const std::string& user);
+
+ private:
+  std::vector<Texture>& textures_;
+  std::map<std::string, int32_t> known_;
+};
+
+}  // namespace lumicut::io
