@@ -3,8 +3,9 @@
  * Space     world is right-handed, metres (or any unit, used throughout); colour is linear Rec.709; angles are radians;
  *           radiance W/(sr m2), intensity W/sr, irradiance W/m2. Matrices are row-major 3x4 affine maps (p' = M p).
  * Growth    every descriptor starts with struct_size = sizeof(itself). Fields are only ever appended: missing ones take
- *           their defaults (0 unless said), a non-zero unknown tail gives LUMICUT_UNSUPPORTED. An array of descriptors is
- *           strided by the struct_size of its first element. `reserved` fields must be 0.
+ *           their defaults (what 0 means), a non-zero unknown tail gives LUMICUT_UNSUPPORTED. An array of descriptors is
+ *           strided by the struct_size of its first element, which all share. Of a descriptor that the library fills, the
+ *           fields that fit are written and an unknown tail is zeroed. `reserved` fields must be 0.
  * Errors    functions return a lumicut_result; lumicut_last_error() then gives this thread's text, naming field and
  *           value. A call that fails leaves its object as it was. Bad input never crashes; nothing is thrown.
  * Memory    inputs are copied before the call returns, unless said. Outputs named "view" are borrowed: valid until the
@@ -32,6 +33,7 @@ extern "C" {
 
 #define LUMICUT_ABI_MAJOR 1
 #define LUMICUT_ABI_MINOR 0
+#define LUMICUT_FOREVER 0xffffffffu /* milliseconds */
 
 typedef int32_t lumicut_result;
 enum {
@@ -77,8 +79,8 @@ enum { LUMICUT_IDLE = 0, LUMICUT_RUNNING = 1, LUMICUT_DONE = 2, LUMICUT_STOPPED 
 
 /* Of accel, scene, integrator or render, while a call of it works in another thread. */
 LUMICUT_API lumicut_result lumicut_get_status(void* handle, lumicut_status* status); /* [any] */
-LUMICUT_API lumicut_result lumicut_cancel(void* handle); /* [any] what runs returns LUMICUT_CANCELLED soon; the object stays usable */
-LUMICUT_API const char* lumicut_stats_json(void* handle); /* [object] counters and seconds per phase of the last work */
+LUMICUT_API lumicut_result lumicut_cancel(void* handle); /* [any] what runs returns LUMICUT_CANCELLED soon; the object stays usable; idle: nothing */
+LUMICUT_API const char* lumicut_stats_json(void* handle); /* [object] counters and seconds per phase of the last work; view; docs/c_abi.md */
 
 /* ---- Level 1, accel: rays against triangles or boxes. Ray and hit fields are Embree's, in Embree's order ---------- */
 
@@ -233,7 +235,7 @@ typedef struct lumicut_trace {
   void* user;
 } lumicut_trace;
 
-LUMICUT_API lumicut_result lumicut_scene_create(lumicut_device device, const lumicut_scene_desc* desc, lumicut_scene* scene); /* [any] */
+LUMICUT_API lumicut_result lumicut_scene_create(lumicut_device device, const lumicut_scene_desc* desc, lumicut_scene* scene); /* [any] desc NULL: defaults */
 /* All setters are [object], replace what was set, and take effect at the next commit. */
 LUMICUT_API lumicut_result lumicut_scene_set_textures(lumicut_scene scene, const lumicut_texture* textures, uint64_t count);
 LUMICUT_API lumicut_result lumicut_scene_set_materials(lumicut_scene scene, const lumicut_material* materials, uint64_t count);
@@ -327,9 +329,9 @@ typedef struct lumicut_channel_info {
 LUMICUT_API lumicut_result lumicut_get_channel_info(uint32_t index, lumicut_channel_info* info); /* [any] "radiance", "alpha", "depth" ... */
 /* Starts in the background: prepares the integrator if need be, renders. Integrator and scene may not change meanwhile. */
 LUMICUT_API lumicut_result lumicut_render_start(lumicut_integrator integrator, lumicut_scene scene, const lumicut_render_desc* desc, lumicut_render* render); /* [object] both */
-LUMICUT_API lumicut_result lumicut_render_wait(lumicut_render render, uint32_t milliseconds, lumicut_status* status); /* [any] returns when done or after that time; a failed render's error comes back here */
+LUMICUT_API lumicut_result lumicut_render_wait(lumicut_render render, uint32_t milliseconds, lumicut_status* status); /* [any] returns when done or after that time (0: at once, LUMICUT_FOREVER); a failed render's error comes back here. status may be NULL */
 LUMICUT_API lumicut_result lumicut_render_next_tile(lumicut_render render, lumicut_tile* tile); /* [object] finished tiles, each once; x1 = 0: none now */
-LUMICUT_API lumicut_result lumicut_render_read(lumicut_render render, const char* channel, const lumicut_tile* rect, float* out); /* [any] rect NULL: the crop; rows packed from the top */
+LUMICUT_API lumicut_result lumicut_render_read(lumicut_render render, const char* channel, const lumicut_tile* rect, float* out); /* [any] rect NULL: the crop; rows packed from the top; tiles not done yet are 0 */
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,170 @@
+// Level 3: integrators, their parameters, their lights, and shading of a host's points.
+#include <map>
+
+#include "plugin/check.h"
+#include "plugin/convert.h"
+#include "plugin/descriptors.h"
+#include "plugin/objects.h"
+
+using namespace lumicut;
+
+static_assert(offsetof(lumicut_vpl, normal) == offsetof(Vpl, normal) &&
+              offsetof(lumicut_vpl, intensity) == offsetof(Vpl, intensity) &&
+              offsetof(lumicut_vpl, spread_tan) == offsetof(Vpl, spread_tan));
+static_assert(sizeof(lumicut_point) == 64);
+
+namespace {
+
+const IntegratorEntry& entry_named(const char* id) {
+  if (id == nullptr) fail_argument("integrator: id is NULL");
+  if (const IntegratorEntry* entry = find_integrator(id)) return *entry;
+  std::string known;
+  for (const IntegratorEntry& e : integrators()) known += (known.empty() ? "" : ", ") + std::string(e.id);
+  fail_argument(std::string("integrator: \"") + id + "\" is not known; there are: " + known);
+}
+
+// First and last points of each batch. A pixel's points stay together, and batches depend on the input alone.
+std::vector<std::pair<uint64_t, uint64_t>> batches_of(const lumicut_point* points, uint64_t count, uint64_t wanted) {
+  std::vector<std::pair<uint64_t, uint64_t>> batches;
+  for (uint64_t first = 0; first < count;) {
+    uint64_t last = std::min(count, first + wanted);
+    while (last < count && points[last].pixel == points[last - 1].pixel) ++last;
+    batches.emplace_back(first, last);
+    first = last;
+  }
+  return batches;
+}
+
+}  // namespace
+
+lumicut_result lumicut_get_integrator_info(uint32_t index, lumicut_integrator_info* info) {
+  return guard([&] {
+    const auto all = integrators();
+    if (index >= all.size())
+      fail_argument("lumicut_get_integrator_info: index " + number_text(uint64_t{index}) +
+                    " is out of range: there are " + number_text(uint64_t{all.size()}) + " integrators");
+    const IntegratorEntry& e = all[index];
+    lumicut_integrator_info out{};
+    out.param_count = static_cast<uint32_t>(all_params(e).size());
+    out.id = e.id, out.label = e.label, out.description = e.description, out.source = e.source;
+    write(info, out);
+  });
+}
+
+lumicut_result lumicut_get_param_info(const char* integrator, uint32_t index, lumicut_param_info* info) {
+  return guard([&] {
+    const IntegratorEntry& e = entry_named(integrator);
+    const std::vector<ParamInfo> params = all_params(e);
+    if (index >= params.size())
+      fail_argument("lumicut_get_param_info: index " + number_text(uint64_t{index}) + " is out of range: " + e.id +
+                    " has " + number_text(uint64_t{params.size()}) + " parameters");
+    const ParamInfo& p = params[index];  // its texts are literals
+    lumicut_param_info out{};
+    out.type = static_cast<uint32_t>(p.type);
+    out.id = p.id, out.label = p.label, out.description = p.description, out.unit = p.unit;
+    out.choices = p.choices, out.default_text = p.default_text;
+    out.minimum = p.minimum, out.maximum = p.maximum;
+    write(info, out);
+  });
+}
+
+lumicut_result lumicut_integrator_create(lumicut_device device, const char* id, lumicut_integrator* integrator) {
+  return guard([&] {
+    lumicut_device_t& d = object(device);
+    const IntegratorEntry& e = entry_named(id);
+    if (integrator == nullptr) fail_argument("lumicut_integrator_create: integrator is NULL");
+    *integrator = new lumicut_integrator_t(d, e);
+  });
+}
+
+lumicut_result lumicut_integrator_set(lumicut_integrator integrator, const char* name, const char* value) {
+  return guard([&] {
+    lumicut_integrator_t& i = object(integrator);
+    if (name == nullptr || value == nullptr) fail_argument("lumicut_integrator_set: name or value is NULL");
+    const Gate::Hold hold = i.gate.change("lumicut_integrator_set");
+    i.params.set(name, value);
+  });
+}
+
+const char* lumicut_integrator_get(lumicut_integrator integrator, const char* name) {
+  const char* text = nullptr;
+  guard([&] {
+    lumicut_integrator_t& i = object(integrator);
+    if (name == nullptr) fail_argument("lumicut_integrator_get: name is NULL");
+    const std::string* value = i.params.text(name);
+    if (value == nullptr) fail_argument(std::string("lumicut_integrator_get: no parameter \"") + name + "\"");
+    text = value->c_str();
+  });
+  return text;
+}
+
+lumicut_result lumicut_integrator_set_lights(lumicut_integrator integrator, const lumicut_vpl* lights, uint64_t count) {
+  return guard([&] {
+    lumicut_integrator_t& i = object(integrator);
+    const Gate::Hold hold = i.gate.change("lumicut_integrator_set_lights");
+    if (count == 0) {
+      i.host_lights.reset();
+      i.host_lights_id = 0;
+      return;
+    }
+    i.host_lights = std::make_shared<const VplSet>(to_vpls(lights, count));
+    i.host_lights_id = ++i.host_lights_sets;
+  });
+}
+
+lumicut_result lumicut_integrator_prepare(lumicut_integrator integrator, lumicut_scene scene) {
+  return guard([&] {
+    lumicut_integrator_t& i = object(integrator);
+    lumicut_scene_t& s = object(scene);
+    const Gate::Hold changing = i.gate.change("lumicut_integrator_prepare");
+    const Gate::Hold reading = s.gate.read("lumicut_integrator_prepare");
+    s.require_committed();
+    auto stats = std::make_unique<Stats>();
+    run_work(i.work, [&](Progress& progress) { i.device->arena.run([&] { i.prepare(s, progress, *stats); }); });
+    i.stats = std::move(stats);
+  });
+}
+
+lumicut_result lumicut_integrator_get_lights(lumicut_integrator integrator, const lumicut_vpl** lights,
+                                             uint64_t* count) {
+  return guard([&] {
+    lumicut_integrator_t& i = object(integrator);
+    if (lights == nullptr || count == nullptr) fail_argument("lumicut_integrator_get_lights: lights or count is NULL");
+    const Gate::Hold hold = i.gate.read("lumicut_integrator_get_lights");
+    if (i.prepared == nullptr) fail_state("lumicut_integrator: it is not prepared");
+    *lights = reinterpret_cast<const lumicut_vpl*>(i.prepared->vpls->lights.data());
+    *count = i.prepared->vpls->lights.size();
+  });
+}
+
+lumicut_result lumicut_integrator_shade(lumicut_integrator integrator, const lumicut_point* points, uint64_t count,
+                                        float* radiance) {
+  return guard([&] {
+    lumicut_integrator_t& i = object(integrator);
+    if (count > 0 && (points == nullptr || radiance == nullptr))
+      fail_argument("lumicut_integrator_shade: points or radiance is NULL, but count is " + number_text(count));
+    const Gate::Hold using_integrator = i.gate.read("lumicut_integrator_shade");
+    if (i.prepared == nullptr) fail_state("lumicut_integrator: it is not prepared");
+    const Prepared& p = *i.prepared;
+    const Gate::Hold using_scene = p.scene->gate.read("lumicut_integrator_shade");
+    if (p.scene->changed || p.scene_version != p.scene->scene.version())
+      fail_state("lumicut_integrator: its scene was changed since lumicut_integrator_prepare");
+    const std::shared_ptr<Progress> progress = i.work.share();
+    const Scene& scene = p.scene->scene;
+    i.device->arena.run([&] {
+      check_points(scene, points, count);
+      const auto batches = batches_of(points, count, std::max<size_t>(1, p.method->batch_size()));
+      tbb::parallel_for(size_t{0}, batches.size(), [&](size_t b) {
+        progress->check();
+        const auto [first, last] = batches[b];
+        ShadePoints batch;
+        batch.reserve(last - first);
+        append_points(scene, points, first, last, batch);
+        batch.finish();
+        std::vector<Rgb> light(last - first);
+        p.method->shade(batch, light, {}, {*progress, *i.stats});
+        std::memcpy(radiance + 3 * first, light.data(), light.size() * sizeof(Rgb));
+      });
+    });
+  });
+}

@@ -1,0 +1,82 @@
+// Level 4: whole frames.
+#include "plugin/check.h"
+#include "plugin/convert.h"
+#include "plugin/descriptors.h"
+#include "plugin/render_job.h"
+
+using namespace lumicut;
+
+namespace {
+
+const ChannelInfo& channel_named(const char* name) {
+  if (name == nullptr) fail_argument("lumicut_render_read: channel is NULL");
+  std::string known;
+  for (const ChannelInfo& c : channel_table()) {
+    if (std::strcmp(c.name, name) == 0) return c;
+    known += (known.empty() ? "" : ", ") + std::string(c.name);
+  }
+  fail_argument(std::string("lumicut_render_read: channel \"") + name + "\" is not known; there are: " + known);
+}
+
+}  // namespace
+
+lumicut_result lumicut_get_channel_info(uint32_t index, lumicut_channel_info* info) {
+  return guard([&] {
+    const auto table = channel_table();
+    if (index >= table.size())
+      fail_argument("lumicut_get_channel_info: index " + number_text(uint64_t{index}) + " is out of range: there are " +
+                    number_text(uint64_t{table.size()}) + " channels");
+    lumicut_channel_info out{};
+    out.components = table[index].components;
+    out.name = table[index].name, out.description = table[index].description;
+    write(info, out);
+  });
+}
+
+lumicut_result lumicut_render_start(lumicut_integrator integrator, lumicut_scene scene, const lumicut_render_desc* desc,
+                                    lumicut_render* render) {
+  return guard([&] {
+    lumicut_integrator_t& i = object(integrator);
+    lumicut_scene_t& s = object(scene);
+    if (render == nullptr) fail_argument("lumicut_render_start: render is NULL");
+    *render = new lumicut_render_t(i, s, to_frame_options(read(desc)));
+  });
+}
+
+lumicut_result lumicut_render_wait(lumicut_render render, uint32_t milliseconds, lumicut_status* status) {
+  return guard([&] {
+    lumicut_render_t& r = object(render);
+    const auto error = r.wait(milliseconds);
+    if (status != nullptr) write(status, r.status());
+    if (error) throw *error;
+  });
+}
+
+lumicut_result lumicut_render_next_tile(lumicut_render render, lumicut_tile* tile) {
+  return guard([&] {
+    lumicut_render_t& r = object(render);
+    write(tile, lumicut_tile{});  // a wrong structure must not cost a tile
+    const Rect rect = r.next_tile();
+    write(tile, {0, rect.x0, rect.y0, rect.x1, rect.y1});
+  });
+}
+
+lumicut_result lumicut_render_read(lumicut_render render, const char* channel, const lumicut_tile* rect, float* out) {
+  return guard([&] {
+    lumicut_render_t& r = object(render);
+    const ChannelInfo& c = channel_named(channel);
+    if (out == nullptr) fail_argument("lumicut_render_read: out is NULL");
+    const Rect& crop = r.options.crop;
+    Rect part = crop;
+    if (rect != nullptr) {
+      const lumicut_tile in = read(rect);
+      part = {in.x0, in.y0, in.x1, in.y1};
+    }
+    if (part.x0 >= part.x1 || part.y0 >= part.y1 || part.x0 < crop.x0 || part.y0 < crop.y0 || part.x1 > crop.x1 ||
+        part.y1 > crop.y1)
+      fail_argument("lumicut_tile: (" + number_text(uint64_t{part.x0}) + ", " + number_text(uint64_t{part.y0}) + ", " +
+                    number_text(uint64_t{part.x1}) + ", " + number_text(uint64_t{part.y1}) +
+                    ") is not a rectangle inside the crop");
+    r.read(c, part, out);
+  });
+}

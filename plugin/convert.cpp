@@ -1,0 +1,398 @@
+#include "plugin/convert.h"
+
+#include <unistd.h>
+
+#include <numbers>
+
+#include "core/parallel.h"
+#include "plugin/check.h"
+#include "plugin/descriptors.h"
+
+namespace lumicut {
+
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+constexpr float kInf = std::numeric_limits<float>::infinity();
+constexpr uint32_t kMaxGroup = 0xffff;
+// Below this opening angle 1 − cos(half) drowns in single precision.
+constexpr float kMinAngle = 0.002f;
+
+Vec3f vec(const float (&v)[3]) { return {v[0], v[1], v[2]}; }
+Vec3d vec_double(const float (&v)[3]) { return {v[0], v[1], v[2]}; }
+
+int32_t texture_index(const Checked& c, const char* name, int32_t one_based) {
+  if (one_based < 0) c.fail(name, number_text(int64_t{one_based}) + " is negative; 0 means none, 1 the first texture");
+  return one_based - 1;
+}
+
+// Cosine of the angle between two edges; 1 where one has no length.
+double edge_cosine(const Vec3d& a, const Vec3d& b) {
+  const double l = length(a) * length(b);
+  return l > 0 ? std::abs(dot(a, b)) / l : 1.0;
+}
+
+void check_count(const Checked& c, const char* name, uint64_t count) { c.integer(name, count, 0, 0xfffffffeu); }
+
+const char* type_name(uint32_t type) {
+  static constexpr const char* kNames[] = {"point", "spot", "rectangle", "disk", "sun"};
+  return kNames[type];
+}
+
+}  // namespace
+
+Texture to_texture(const lumicut_texture& in, uint64_t index) {
+  const Checked c("lumicut_texture", index);
+  c.integer("width", in.width, 1, 65536);
+  c.integer("height", in.height, 1, 65536);
+  c.integer("channels", in.channels, 1, 4);
+  c.integer("format", in.format, LUMICUT_UINT8, LUMICUT_FLOAT32);
+  c.flags("flags", in.flags, LUMICUT_SRGB | LUMICUT_CLAMP | LUMICUT_NEAREST);
+  if (in.pixels == nullptr) c.fail("pixels", "is NULL");
+  Texture::Options options;
+  options.srgb = (in.flags & LUMICUT_SRGB) != 0;
+  options.clamp = (in.flags & LUMICUT_CLAMP) != 0;
+  options.nearest = (in.flags & LUMICUT_NEAREST) != 0;
+  return {in.width,    in.height,
+          in.channels, in.format == LUMICUT_UINT8 ? Texture::Format::uint8 : Texture::Format::float32,
+          options,     in.pixels};
+}
+
+Material to_material(const lumicut_material& in, uint64_t index) {
+  const Checked c("lumicut_material", index);
+  c.flags("flags", in.flags, LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG);
+  c.range("diffuse", in.diffuse, 0.0f, 1.0f);
+  c.range("specular", in.specular, 0.0f, 1.0f);
+  c.range("shininess", in.shininess, 0.0f, 1e6f);
+  c.range("opacity", in.opacity, 0.0f, 1.0f);
+  c.not_negative("emission", in.emission);
+  Material m;
+  m.diffuse = vec(in.diffuse);
+  m.specular = vec(in.specular);
+  m.shininess = in.shininess;
+  m.phong = (in.flags & LUMICUT_PHONG) != 0;
+  m.opacity = in.opacity == 0.0f ? 1.0f : in.opacity;
+  m.emission = vec(in.emission);
+  m.emit_both_sides = (in.flags & LUMICUT_EMIT_BOTH_SIDES) != 0;
+  m.diffuse_texture = texture_index(c, "diffuse_texture", in.diffuse_texture);
+  m.specular_texture = texture_index(c, "specular_texture", in.specular_texture);
+  m.opacity_texture = texture_index(c, "opacity_texture", in.opacity_texture);
+  m.emission_texture = texture_index(c, "emission_texture", in.emission_texture);
+  return m;
+}
+
+std::vector<Vec3f> to_normals(const float* xyz, uint64_t count) {
+  std::vector<Vec3f> out;
+  if (xyz == nullptr || count == 0) return out;
+  out.resize(count);
+  std::memcpy(static_cast<void*>(out.data()), xyz, count * sizeof(Vec3f));
+  return out;
+}
+
+std::vector<Vec3f> to_positions(const float* xyz, uint64_t count, const char* owner) {
+  std::vector<Vec3f> out = to_normals(xyz, count);
+  for (uint64_t i = 0; i < out.size(); ++i)
+    if (!is_finite(out[i]))
+      for (int k = 0; k < 3; ++k) Checked(owner).finite("positions", out[i][k], static_cast<int64_t>(3 * i) + k);
+  return out;
+}
+
+std::vector<Transform> to_transforms(const float* m, uint64_t count, const char* owner) {
+  std::vector<Transform> out;
+  if (m == nullptr) return out;
+  out.resize(count);
+  for (uint64_t i = 0; i < count; ++i)
+    for (int k = 0; k < 12; ++k) {
+      const float v = m[12 * i + k];
+      Checked(owner).finite("transforms", v, static_cast<int64_t>(12 * i) + k);
+      out[i].m[k] = v;
+    }
+  return out;
+}
+
+Mesh to_mesh(const lumicut_mesh& in) {
+  const Checked c("lumicut_mesh");
+  check_count(c, "vertex_count", in.vertex_count);
+  check_count(c, "triangle_count", in.triangle_count);
+  check_count(c, "transform_count", in.transform_count);
+  c.integer("group", in.group, 0, kMaxGroup);
+  if (in.vertex_count > 0 && in.positions == nullptr)
+    c.fail("positions", "is NULL, but vertex_count is " + number_text(in.vertex_count));
+  if (in.triangle_count > 0 && in.indices == nullptr)
+    c.fail("indices", "is NULL, but triangle_count is " + number_text(in.triangle_count));
+  if (in.transforms == nullptr && in.transform_count > 0)
+    c.fail("transforms", "is NULL, but transform_count is " + number_text(in.transform_count));
+  if (in.transforms != nullptr && in.transform_count == 0)
+    c.fail("transform_count", "is 0, but transforms is not NULL");
+
+  Mesh mesh;
+  mesh.positions = to_positions(in.positions, in.vertex_count, "lumicut_mesh");
+  mesh.normals = to_normals(in.normals, in.vertex_count);
+  if (in.uvs != nullptr) {
+    // What only shades is mended, not refused: real models carry broken uvs and normals.
+    const auto mended = [](float v) { return std::isfinite(v) ? v : 0.0f; };
+    mesh.uvs.resize(in.vertex_count);
+    for (uint64_t i = 0; i < in.vertex_count; ++i) mesh.uvs[i] = {mended(in.uvs[2 * i]), mended(in.uvs[2 * i + 1])};
+  }
+  if (in.triangle_count > 0) mesh.indices.assign(in.indices, in.indices + 3 * in.triangle_count);
+  for (size_t i = 0; i < mesh.indices.size(); ++i)
+    if (mesh.indices[i] >= in.vertex_count)
+      c.fail("indices",
+             number_text(uint64_t{mesh.indices[i]}) + " is not below vertex_count " + number_text(in.vertex_count),
+             static_cast<int64_t>(i));
+  if (in.materials != nullptr && in.triangle_count > 0)
+    mesh.triangle_materials.assign(in.materials, in.materials + in.triangle_count);
+  mesh.instances = to_transforms(in.transforms, in.transform_count, "lumicut_mesh");
+  mesh.material = in.material;
+  mesh.mask = in.mask == 0 ? 0xffffffffu : in.mask;
+  mesh.group = in.group;
+  return mesh;
+}
+
+Light to_light(const lumicut_light& in, uint64_t index) {
+  const Checked c("lumicut_light", index);
+  c.integer("type", in.type, LUMICUT_POINT, LUMICUT_SUN);
+  c.integer("unit", in.unit, LUMICUT_RADIOMETRIC, LUMICUT_WATT);
+  c.integer("group", in.group, 0, kMaxGroup);
+  c.not_negative("color", in.color);
+  c.not_negative("value", in.value);
+  const bool sun = in.type == LUMICUT_SUN, spot = in.type == LUMICUT_SPOT, point = in.type == LUMICUT_POINT;
+  const bool area = in.type == LUMICUT_RECTANGLE || in.type == LUMICUT_DISK;
+
+  Light light;
+  light.type = static_cast<LightType>(in.type);
+  light.group = in.group;
+  if (!sun) {
+    c.finite("position", in.position);
+    light.position = vec(in.position);
+  }
+  if (point || spot) c.not_negative("radius", in.radius);
+  if (sun) c.range("radius", in.radius, 0.0f, 0.5f * kPi);
+  if (!area) light.radius = in.radius;
+  if (spot || sun) light.direction = c.direction("direction", in.direction);
+  if (spot) {
+    c.range("angle", in.angle, kMinAngle, kPi + 1e-5f);
+    c.range("blend", in.blend, 0.0f, 1.0f);
+    c.integer("spot_cosine", in.spot_cosine, 0, 1);
+    const double half = 0.5 * in.angle;
+    light.cos_outer = static_cast<float>(std::cos(half));
+    // 1 − cos h = 2 sin²(h/2) without the cancellation.
+    light.blend_cosine = static_cast<float>(2.0 * std::sin(0.5 * half) * std::sin(0.5 * half) * in.blend);
+    light.spot_cosine = in.spot_cosine != 0;
+  }
+
+  double scale = in.value;  // of `color`, radiometric
+  if (area) {
+    c.finite("u", in.u);
+    c.finite("v", in.v);
+    const Vec3d u = vec_double(in.u), v = vec_double(in.v);
+    const double box = length(cross(u, v));
+    if (!(box > std::numeric_limits<float>::min()))
+      c.fail("u", std::string("with v spans no area; a ") + type_name(in.type) + " needs two edges");
+    if (edge_cosine(u, v) > 1e-3) c.fail("u", "is not orthogonal to v (cosine " + number_text(edge_cosine(u, v)) + ")");
+    light.u = vec(in.u), light.v = vec(in.v);
+    light.spread = in.spread == 0.0f ? kPi : in.spread;
+    c.range("spread", light.spread, kMinAngle, kPi + 1e-5f);
+    light.spread = std::min(light.spread, kPi);
+    if (in.unit == LUMICUT_WATT) scale /= 4.0 * box * (in.type == LUMICUT_DISK ? 0.25 * std::numbers::pi : 1.0);
+  } else if (in.unit == LUMICUT_WATT && !sun) {
+    scale /= 4.0 * std::numbers::pi;
+  }
+  for (int k = 0; k < 3; ++k) {
+    const double value = scale * in.color[k];
+    if (value > std::numeric_limits<float>::max())
+      c.fail("value", number_text(in.value) + " times color gives " + number_text(value) + ", beyond single precision");
+    light.value[k] = static_cast<float>(value);
+  }
+  return light;
+}
+
+Environment to_environment(const lumicut_environment& in) {
+  const Checked c("lumicut_environment");
+  c.integer("group", in.group, 0, kMaxGroup);
+  c.not_negative("color", in.color);
+  Environment e;
+  e.group = in.group;
+  e.color = vec(in.color);
+  e.texture = texture_index(c, "texture", in.texture);
+  bool given = false;
+  for (int k = 0; k < 9; ++k) {
+    c.finite("world_to_map", in.world_to_map[k], k);
+    given = given || in.world_to_map[k] != 0.0f;
+  }
+  if (!given) return e;
+  for (int row = 0; row < 3; ++row)
+    for (int other = row; other < 3; ++other) {
+      double d = 0;
+      for (int k = 0; k < 3; ++k) d += double{in.world_to_map[3 * row + k]} * in.world_to_map[3 * other + k];
+      if (std::abs(d - (row == other ? 1.0 : 0.0)) > 1e-3)
+        c.fail("world_to_map", "is no rotation: rows " + number_text(int64_t{row}) + " and " +
+                                   number_text(int64_t{other}) + " have the dot product " + number_text(d));
+    }
+  std::copy(std::begin(in.world_to_map), std::end(in.world_to_map), e.world_to_map);
+  return e;
+}
+
+Camera to_camera(const lumicut_camera& in) {
+  const Checked c("lumicut_camera");
+  c.integer("orthographic", in.orthographic, 0, 1);
+  for (int k = 0; k < 12; ++k) c.finite("to_world", in.to_world[k], k);
+  const auto column = [&](int k) { return Vec3d{in.to_world[k], in.to_world[4 + k], in.to_world[8 + k]}; };
+  const Vec3d x = column(0), y = column(1), z = column(2);
+  for (int k = 0; k < 3; ++k)
+    if (!(length(column(k)) > 0.0)) c.fail("to_world", "column " + number_text(int64_t{k}) + " is 0");
+  const double shear = std::max(edge_cosine(x, y), std::max(edge_cosine(y, z), edge_cosine(z, x)));
+  if (shear > 1e-3) c.fail("to_world", "axes are not orthogonal (cosine " + number_text(shear) + ")");
+
+  Camera camera;
+  camera.orthographic = in.orthographic != 0;
+  const auto single = [](const Vec3d& v) {
+    return Vec3f{static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+  };
+  const Vec3d back = normalize(z), right = normalize(x - back * dot(x, back));
+  const Vec3d up = normalize(y - back * dot(y, back) - right * dot(y, right));
+  camera.forward = single(-back), camera.right = single(right), camera.up = single(up);
+  camera.position = single(column(3));
+  if (camera.orthographic) {
+    c.range("height", in.height, std::numeric_limits<float>::min(), kInf);
+    camera.height = in.height;
+  } else {
+    c.range("fov_y", in.fov_y, 1e-4f, kPi - 1e-4f);
+    camera.tan_half_fov_y = static_cast<float>(std::tan(0.5 * in.fov_y));
+  }
+  c.finite("shift", in.shift[0], 0);
+  c.finite("shift", in.shift[1], 1);
+  camera.shift_x = in.shift[0], camera.shift_y = in.shift[1];
+  c.not_negative("near_clip", in.near_clip);
+  camera.near_clip = in.near_clip;
+  if (in.far_clip != 0.0f) {
+    if (!(in.far_clip > in.near_clip))
+      c.fail("far_clip", number_text(in.far_clip) + " is not beyond near_clip " + number_text(in.near_clip));
+    camera.far_clip = in.far_clip;
+  }
+  if (in.pixel_aspect != 0.0f) {
+    c.range("pixel_aspect", in.pixel_aspect, 1e-3f, 1e3f);
+    camera.pixel_aspect = in.pixel_aspect;
+  }
+  c.not_negative("lens_radius", in.lens_radius);
+  camera.lens_radius = in.lens_radius;
+  if (in.lens_radius > 0.0f) {
+    c.range("focus_distance", in.focus_distance, std::numeric_limits<float>::min(), kInf);
+    camera.focus_distance = in.focus_distance;
+  }
+  return camera;
+}
+
+VplSet to_vpls(const lumicut_vpl* lights, uint64_t count) {
+  static_assert(sizeof(lumicut_vpl) == sizeof(Vpl));
+  VplSet set;
+  if (count == 0) return set;
+  if (lights == nullptr) fail_argument("lumicut_vpls: NULL, but count is " + number_text(count));
+  if (count > 0xfffffffeu) fail_argument("lumicut_vpls: count " + number_text(count) + " is more than 4294967294");
+  set.lights.resize(count);
+  for (uint64_t i = 0; i < count; ++i) {
+    const lumicut_vpl& in = lights[i];
+    const Checked c("lumicut_vpl", i);
+    c.integer("kind", in.kind, LUMICUT_VPL_OMNI, LUMICUT_VPL_SPOT);
+    c.integer("group", in.group, 0, kMaxGroup);
+    c.not_negative("intensity", in.intensity);
+    if (in.reserved != 0.0f) c.fail_unknown("reserved", number_text(in.reserved) + " is not 0");
+    Vpl& vpl = set.lights[i];
+    vpl.kind = static_cast<VplKind>(in.kind);
+    vpl.group = in.group;
+    vpl.intensity = vec(in.intensity);
+    if (vpl.kind != VplKind::directional) {
+      c.finite("position", in.position);
+      vpl.position = vec(in.position);
+    }
+    if (vpl.kind != VplKind::omni) {
+      c.finite("normal", in.normal);
+      const double l = length(vec_double(in.normal));
+      if (std::abs(l - 1.0) > 1e-2) c.fail("normal", "has length " + number_text(l) + ", not 1");
+      // Those that are unit as far as floats go stay as they are, so that a set goes out and in again unchanged.
+      vpl.normal = std::abs(l - 1.0) > 1e-6 ? vec(in.normal) * static_cast<float>(1.0 / l) : vec(in.normal);
+    }
+    if (vpl.kind == VplKind::spot) {
+      c.range("cos_outer", in.cos_outer, -1.0f, 1.0f);
+      c.range("blend", in.blend, 0.0f, 2.0f);
+      c.range("spot_cosine", in.spot_cosine, 0.0f, 1.0f);
+      c.not_negative("spread_tan", in.spread_tan);
+      vpl.cos_outer = in.cos_outer, vpl.blend_cosine = in.blend, vpl.spot_cosine = in.spot_cosine;
+      vpl.spread_tan = in.spread_tan;
+    }
+  }
+  return set;
+}
+
+namespace {
+void check_unit(const Checked& c, const char* name, const float (&v)[3]) {
+  c.finite(name, v);
+  const double l = length(vec_double(v));
+  if (std::abs(l - 1.0) > 1e-2) c.fail(name, "has length " + number_text(l) + ", not 1");
+}
+}  // namespace
+
+void check_points(const Scene& scene, const lumicut_point* points, uint64_t count) {
+  if (count > 0 && points == nullptr) fail_argument("lumicut_points: NULL, but count is " + number_text(count));
+  const size_t materials = scene.materials().size();
+  parallel_chunks(count, 16384, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      const Checked c("lumicut_point", i);
+      const lumicut_point& p = points[i];
+      c.finite("position", p.position);
+      check_unit(c, "normal", p.normal);
+      check_unit(c, "geometric_normal", p.geometric_normal);
+      check_unit(c, "to_viewer", p.to_viewer);
+      c.finite("u", p.u);
+      c.finite("v", p.v);
+      if (p.material >= materials)
+        c.fail("material", number_text(uint64_t{p.material}) + " is out of range: the scene has " +
+                               number_text(uint64_t{materials}) + " materials");
+    }
+  });
+}
+
+void append_points(const Scene& scene, const lumicut_point* points, uint64_t first, uint64_t last, ShadePoints& out) {
+  for (uint64_t i = first; i < last; ++i) {
+    const lumicut_point& p = points[i];
+    out.push(scene.shade_point(vec(p.position), normalize(vec(p.geometric_normal)), normalize(vec(p.normal)),
+                               {p.u, p.v}, p.material, normalize(vec(p.to_viewer)), p.pixel));
+  }
+}
+
+FrameOptions to_frame_options(const lumicut_render_desc& in) {
+  const Checked c("lumicut_render_desc");
+  c.integer("width", in.width, 1, 65536);
+  c.integer("height", in.height, 1, 65536);
+  c.integer("samples", in.samples, 0, 65536);
+  if (in.tile_size != 0) c.integer("tile_size", in.tile_size, 8, 65536);
+  FrameOptions o;
+  o.width = in.width, o.height = in.height;
+  o.samples = in.samples == 0 ? 1 : in.samples;
+  // A batch holds at least a tile's samples: tiles shrink rather than let memory grow with the samples.
+  const auto tile_points = [&] { return uint64_t{o.tile_size} * o.tile_size * o.samples; };
+  o.tile_size = in.tile_size == 0 ? 64 : in.tile_size;
+  while (in.tile_size == 0 && o.tile_size > 8 && tile_points() > 1u << 20) o.tile_size /= 2;
+  if (in.tile_size != 0 && tile_points() > 1u << 24)
+    c.fail("tile_size", number_text(uint64_t{in.tile_size}) + " with " + number_text(uint64_t{o.samples}) +
+                            " samples is more than 2^24 samples a tile");
+  o.crop = {in.crop[0], in.crop[1], in.crop[2], in.crop[3]};
+  if (o.crop == Rect{}) o.crop = {0, 0, in.width, in.height};
+  if (o.crop.x0 >= o.crop.x1 || o.crop.y0 >= o.crop.y1 || o.crop.x1 > in.width || o.crop.y1 > in.height) {
+    std::string text = "(";
+    for (int k = 0; k < 4; ++k) text += number_text(uint64_t{in.crop[k]}) + (k < 3 ? ", " : ")");
+    c.fail("crop", text + " is not a rectangle x0, y0, x1, y1 inside " + number_text(uint64_t{in.width}) + " x " +
+                       number_text(uint64_t{in.height}));
+  }
+  double components = 0;
+  for (const ChannelInfo& channel : channel_table()) components += channel.components;
+  const double bytes = components * sizeof(float) * o.crop.width() * o.crop.height();
+  const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  if (memory > 0 && bytes > memory)
+    throw Error(ErrorCode::out_of_memory, "lumicut_render_desc: a film of " + number_text(uint64_t{o.crop.width()}) +
+                                              " x " + number_text(uint64_t{o.crop.height()}) + " pixels needs " +
+                                              number_text(std::round(bytes / 1e9)) + " GB, more than the machine has");
+  return o;
+}
+
+}  // namespace lumicut

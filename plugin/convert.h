@@ -1,0 +1,37 @@
+// What hosts describe → what the library computes with: every field is checked, and lamps in watt become radiometric.
+// [docs/units.md] All throw Error naming field and value.
+#pragma once
+
+#include <memory>
+
+#include "film/film.h"
+#include "integrators/frame.h"
+#include "plugin/boundary.h"
+#include "scene/scene.h"
+#include "vpl/vpl.h"
+
+namespace lumicut {
+
+Texture to_texture(const lumicut_texture& in, uint64_t index);
+Material to_material(const lumicut_material& in, uint64_t index);
+Mesh to_mesh(const lumicut_mesh& in);
+Light to_light(const lumicut_light& in, uint64_t index);
+Environment to_environment(const lumicut_environment& in);
+Camera to_camera(const lumicut_camera& in);
+
+// Arrays of an update; NULL gives an empty vector.
+std::vector<Vec3f> to_positions(const float* xyz, uint64_t count, const char* owner);
+std::vector<Vec3f> to_normals(const float* xyz, uint64_t count);  // unchecked: the scene mends broken ones
+std::vector<Transform> to_transforms(const float* m, uint64_t count, const char* owner);
+
+// A host's lights. Normals within 1 % of unit length are made unit.
+VplSet to_vpls(const lumicut_vpl* lights, uint64_t count);
+
+// Points [first, last) of a host, checked against the scene's materials and appended to `out`.
+void append_points(const Scene& scene, const lumicut_point* points, uint64_t first, uint64_t last, ShadePoints& out);
+void check_points(const Scene& scene, const lumicut_point* points, uint64_t count);
+
+// Size, crop, samples and tiles. Fails where the film is larger than the machine's memory.
+FrameOptions to_frame_options(const lumicut_render_desc& in);
+
+}  // namespace lumicut

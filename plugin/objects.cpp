@@ -1,0 +1,183 @@
+#include "plugin/objects.h"
+
+#include <cstdio>
+
+#include "plugin/check.h"
+#include "vpl/trace_vpls.h"
+
+namespace lumicut {
+
+std::shared_ptr<Progress> Work::begin() {
+  const std::lock_guard lock(mutex_);
+  run_ = std::make_shared<Progress>();
+  state_ = LUMICUT_RUNNING;
+  start_ = Clock::now();
+  return run_;
+}
+
+void Work::end(int32_t state) {
+  const std::lock_guard lock(mutex_);
+  state_ = state;
+  end_ = Clock::now();
+}
+
+std::shared_ptr<Progress> Work::share() {
+  const std::lock_guard lock(mutex_);
+  return shared_;
+}
+
+void Work::cancel() {
+  auto next = std::make_shared<Progress>();
+  const std::lock_guard lock(mutex_);
+  run_->cancel();
+  shared_->cancel();
+  shared_ = std::move(next);
+}
+
+double Work::seconds_locked() const {
+  if (state_ == LUMICUT_IDLE) return 0.0;
+  return std::chrono::duration<double>((state_ == LUMICUT_RUNNING ? Clock::now() : end_) - start_).count();
+}
+
+double Work::seconds() const {
+  const std::lock_guard lock(mutex_);
+  return seconds_locked();
+}
+
+lumicut_status Work::status() const {
+  const std::lock_guard lock(mutex_);
+  lumicut_status s{};
+  s.struct_size = sizeof(s);
+  s.state = state_;
+  s.phase = run_->phase();
+  s.fraction = state_ == LUMICUT_DONE ? 1.0 : run_->fraction();
+  s.seconds = seconds_locked();
+  return s;
+}
+
+namespace {
+
+uint64_t proc_status_bytes(const char* key) {
+  uint64_t kilobytes = 0;
+  if (std::FILE* file = std::fopen("/proc/self/status", "re")) {
+    const std::string format = std::string(key) + ": %lu kB";
+    char line[256];
+    unsigned long value = 0;
+    while (std::fgets(line, sizeof(line), file) != nullptr)
+      if (std::sscanf(line, format.c_str(), &value) == 1) kilobytes = value;
+    std::fclose(file);
+  }
+  return kilobytes * 1024;
+}
+
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  }
+  return out + '"';
+}
+
+std::string number_or_null(double v) { return std::isfinite(v) ? number_text(v) : "null"; }
+
+std::string object_text(const std::vector<std::pair<std::string, double>>& entries) {
+  std::string out = "{";
+  for (const auto& [name, value] : entries) {
+    if (out.size() > 1) out += ", ";
+    out += quoted(name) + ": " + number_or_null(value);
+  }
+  return out + "}";
+}
+
+}  // namespace
+
+uint64_t peak_memory() { return proc_status_bytes("VmHWM"); }
+uint64_t resident_memory() { return proc_status_bytes("VmRSS"); }
+
+std::string stats_json(double seconds, const Stats& stats) {
+  const Counters c = stats.counters();
+  return "{\"seconds\": " + number_or_null(seconds) + ", \"phases\": " + object_text(stats.phases()) +
+         ", \"counters\": {\"points\": " + number_text(uint64_t{c.points}) +
+         ", \"rays\": " + number_text(uint64_t{c.rays}) + ", \"bounds\": " + number_text(uint64_t{c.bounds}) +
+         ", \"clusters\": " + number_text(uint64_t{c.clusters}) + "}, \"values\": " + object_text(stats.values()) +
+         ", \"peak_bytes\": " + number_text(peak_memory()) + "}";
+}
+
+namespace {
+
+std::unique_ptr<tbb::global_control> control_for(int threads) {
+  if (threads <= hardware_threads()) return nullptr;
+  return std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                               static_cast<size_t>(threads));
+}
+
+std::string params_text(const Params& params) {
+  std::string out;
+  for (const ParamInfo& p : params.table()) out += std::string(p.id) + "=" + *params.text(p.id) + "\n";
+  return out;
+}
+
+std::string params_text(const Params& params, std::initializer_list<const char*> names) {
+  std::string out;
+  for (const char* name : names) out += std::string(name) + "=" + *params.text(name) + "\n";
+  return out;
+}
+
+VplOptions vpl_options(const Params& params) {
+  VplOptions o;
+  o.count = static_cast<uint32_t>(params.integer("vpls"));
+  o.direct_share = static_cast<float>(params.real("direct_share"));
+  o.max_depth = static_cast<uint32_t>(params.integer("max_depth"));
+  o.seed = static_cast<uint64_t>(params.integer("seed"));
+  return o;
+}
+
+}  // namespace
+}  // namespace lumicut
+
+using namespace lumicut;
+
+lumicut_device_t::lumicut_device_t(int threads, const Log& host_log)
+    : more_threads(control_for(threads)), arena(threads), log(host_log) {}
+
+void lumicut_scene_t::require_committed() const {
+  if (scene.version() == 0) fail_state("lumicut_scene: it was never committed");
+  if (changed || camera_changed) fail_state("lumicut_scene: it was changed since its last commit");
+}
+
+void lumicut_integrator_t::prepare(lumicut_scene_t& of, Progress& progress, Stats& into) {
+  if (of.device.get() != device.get()) fail_argument("lumicut_scene: it belongs to another device than the integrator");
+  const std::string all = params_text(params);
+  const std::string tracing = params_text(params, {"vpls", "direct_share", "max_depth", "seed"});
+  const bool same_scene =
+      prepared != nullptr && prepared->scene.get() == &of && prepared->scene_version == of.scene.version();
+  const bool same_source = same_scene && prepared->host_lights == host_lights_id;
+  if (same_source && prepared->params_key == all) {
+    into.set_value("vpls", static_cast<double>(prepared->vpls->lights.size()));
+    into.set_value("prepare_reused", 1);
+    return;
+  }
+  auto next = std::make_unique<Prepared>();
+  next->scene = Ref(of);
+  next->scene_version = of.scene.version();
+  next->params_key = all;
+  next->vpls_key = tracing;
+  next->host_lights = host_lights_id;
+  next->params = params;
+  if (host_lights != nullptr) {
+    next->vpls = host_lights;
+  } else if (same_source && prepared->vpls_key == tracing) {
+    next->vpls = prepared->vpls;
+  } else {
+    const PhaseTimer timer(into, "light paths");
+    next->vpls = std::make_shared<VplSet>(trace_vpls(of.scene, vpl_options(params), progress));
+  }
+  progress.check();
+  into.set_value("vpls", static_cast<double>(next->vpls->lights.size()));
+  into.set_value("light_paths", static_cast<double>(next->vpls->light_paths));
+  next->method = entry.create();
+  next->method->prepare(of.scene, *next->vpls, *next->params, {progress, into});
+  progress.check();
+  prepared = std::move(next);
+}

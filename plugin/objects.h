@@ -1,0 +1,133 @@
+// What stands behind the handles of lumicut.h.
+#pragma once
+
+#include <tbb/global_control.h>
+
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "accel/accel.h"
+#include "core/log.h"
+#include "core/parallel.h"
+#include "core/progress.h"
+#include "core/stats.h"
+#include "integrators/integrator.h"
+#include "plugin/boundary.h"
+#include "scene/scene.h"
+
+namespace lumicut {
+
+// Long work of one object, seen from other threads: status and cancel.
+class Work {
+ public:
+  // A new run, with a Progress of its own: a cancel that came before it is forgotten.
+  std::shared_ptr<Progress> begin();
+  void end(int32_t state);
+  // For work that many threads do at once (shade): one Progress, replaced when it is cancelled.
+  std::shared_ptr<Progress> share();
+  void cancel();
+  lumicut_status status() const;
+  double seconds() const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  double seconds_locked() const;
+
+  mutable std::mutex mutex_;
+  std::shared_ptr<Progress> run_ = std::make_shared<Progress>(), shared_ = std::make_shared<Progress>();
+  int32_t state_ = LUMICUT_IDLE;
+  Clock::time_point start_{}, end_{};
+};
+
+// Runs fn(progress) as the object's work.
+template <typename Fn>
+void run_work(Work& work, Fn&& fn) {
+  const std::shared_ptr<Progress> progress = work.begin();
+  try {
+    fn(*progress);
+    work.end(LUMICUT_DONE);
+  } catch (...) {
+    work.end(progress->cancelled() ? LUMICUT_STOPPED : LUMICUT_FAILED);
+    throw;
+  }
+}
+
+// {"seconds", "phases", "counters", "values", "peak_bytes"}; see docs/c_abi.md.
+std::string stats_json(double seconds, const Stats& stats);
+// Most memory this process has had, and has now, in bytes (Linux; 0 where not known).
+uint64_t peak_memory();
+uint64_t resident_memory();
+
+// What an integrator made of a scene. Never changes once it is made: shade reads it from many threads.
+struct Prepared {
+  Ref<lumicut_scene_t> scene;
+  uint64_t scene_version = 0;
+  std::string params_key, vpls_key;  // the parameters it was made with: all, those of light tracing
+  uint64_t host_lights = 0;          // which of the host's sets; 0: traced
+  std::shared_ptr<const VplSet> vpls;
+  std::optional<Params> params;
+  std::unique_ptr<Integrator> method;
+};
+
+}  // namespace lumicut
+
+struct lumicut_device_t : lumicut::ObjectOf<lumicut_device_t> {
+  static constexpr auto kKind = lumicut::HandleKind::device;
+  lumicut_device_t(int threads, const lumicut::Log& host_log);
+
+  std::unique_ptr<tbb::global_control> more_threads;  // where the host asks for more than the hardware has
+  lumicut::Arena arena;
+  lumicut::Log log;
+  std::string stats_text;
+};
+
+struct lumicut_accel_t : lumicut::ObjectOf<lumicut_accel_t> {
+  static constexpr auto kKind = lumicut::HandleKind::accel;
+  lumicut::Ref<lumicut_device_t> device;
+  std::vector<lumicut::Vec3f> positions;
+  std::vector<uint32_t> indices;
+  std::unique_ptr<lumicut::Accel> accel;
+  std::string stats_text;
+};
+
+struct lumicut_scene_t : lumicut::ObjectOf<lumicut_scene_t> {
+  static constexpr auto kKind = lumicut::HandleKind::scene;
+  lumicut_scene_t(lumicut_device_t& d, lumicut::Scene::Config config) : device(d), scene(std::move(config)) {}
+
+  // Throws INVALID_STATE where the scene was changed since its last commit, or never had one.
+  void require_committed() const;
+
+  lumicut::Ref<lumicut_device_t> device;
+  lumicut::Gate gate{lumicut::HandleKind::scene};
+  lumicut::Work work;
+  lumicut::Scene scene;
+  bool changed = true;  // beside the camera; which needs no new build and no new lights
+  bool camera_changed = false;
+  std::unique_ptr<lumicut::Stats> stats = std::make_unique<lumicut::Stats>();
+  std::string stats_text;
+};
+
+struct lumicut_integrator_t : lumicut::ObjectOf<lumicut_integrator_t> {
+  static constexpr auto kKind = lumicut::HandleKind::integrator;
+  lumicut_integrator_t(lumicut_device_t& d, const lumicut::IntegratorEntry& e)
+      : device(d), entry(e), params(lumicut::all_params(e)) {}
+
+  // Lights and trees for the scene as it stands; nothing where that was done already. Runs in the device's arena.
+  // On failure what was prepared before stands.
+  void prepare(lumicut_scene_t& scene, lumicut::Progress& progress, lumicut::Stats& into);
+
+  lumicut::Ref<lumicut_device_t> device;
+  const lumicut::IntegratorEntry& entry;
+  lumicut::Gate gate{lumicut::HandleKind::integrator};
+  lumicut::Work work;
+  lumicut::Params params;
+  std::shared_ptr<const lumicut::VplSet> host_lights;  // null: traced
+  uint64_t host_lights_id = 0;                         // rises with each set; 0 where there are none
+  uint64_t host_lights_sets = 0;
+  std::unique_ptr<lumicut::Prepared> prepared;
+  std::unique_ptr<lumicut::Stats> stats = std::make_unique<lumicut::Stats>();
+  std::string stats_text;
+};

@@ -1,0 +1,56 @@
+// A frame rendered in the background: its thread, its film, and the queue of tiles that are done.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <thread>
+
+#include "film/film.h"
+#include "integrators/frame.h"
+#include "plugin/objects.h"
+
+struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
+  static constexpr auto kKind = lumicut::HandleKind::render;
+
+  // Takes both objects for the length of the render, and starts it. Throws INVALID_STATE where they are in use.
+  lumicut_render_t(lumicut_integrator_t& integrator, lumicut_scene_t& scene, const lumicut::FrameOptions& options);
+  // Cancels what runs and waits for it.
+  ~lumicut_render_t();
+
+  lumicut_status status() const;
+  // Waits until the render ends, at most so long. Gives the error of a render that failed or was cancelled.
+  std::optional<lumicut::Error> wait(uint32_t milliseconds) const;
+  // The next tile that is done, once each; x1 = 0 where there is none now.
+  lumicut::Rect next_tile();
+  // Tiles that are not done yet read as 0.
+  void read(const lumicut::ChannelInfo& channel, const lumicut::Rect& rect, float* out);
+
+  lumicut::Work work;
+  lumicut::Stats stats;
+  std::string stats_text;
+  const lumicut::FrameOptions options;
+
+ private:
+  void run() noexcept;
+  void render();
+  void tile_done(const lumicut::Rect& tile);
+  lumicut::Rect tile_rect(uint32_t column, uint32_t row) const;
+
+  lumicut::Ref<lumicut_integrator_t> integrator_;
+  lumicut::Ref<lumicut_scene_t> scene_;
+  lumicut::Gate::Hold using_integrator_, using_scene_;
+  std::shared_ptr<lumicut::Progress> progress_;
+  lumicut::Film film_;
+  const uint32_t columns_, rows_;
+  std::vector<std::atomic<uint8_t>> done_;  // a tile: its pixels may be read
+
+  mutable std::mutex mutex_;
+  mutable std::condition_variable ended_;
+  std::deque<lumicut::Rect> tiles_;
+  uint64_t tiles_done_ = 0;
+  bool over_ = false;
+  lumicut_result result_ = LUMICUT_OK;
+  std::string error_;
+  std::thread thread_;  // last: all above stands before it starts
+};
