@@ -1,0 +1,170 @@
+// Departs from Walter et al.: luminance is bounded through each colour channel on its own, so a blue lamp over a red
+// wall costs nothing; and the cosine to the light's cone and to the surface are bounded in their own frames each.
+#include "clusters/bounds.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "clusters/bounds.cpp"
+#include "hwy/foreach_target.h"  // compiles this file once a target; before highway.h
+
+#include "hwy/highway.h"
+
+#include "hwy/contrib/math/math-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace lumicut::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using D = hn::CappedTag<float, kLanes>;
+using V = hn::Vec<D>;
+
+struct V3 {
+  V x, y, z;
+};
+
+HWY_INLINE V Dot(const V3& a, const V3& b) { return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, hn::Mul(a.x, b.x))); }
+HWY_INLINE V3 Load3(D d, const float (&a)[3][kLanes], size_t i) {
+  return {hn::Load(d, a[0] + i), hn::Load(d, a[1] + i), hn::Load(d, a[2] + i)};
+}
+HWY_INLINE V3 Set3(D d, const Vec3f& v) { return {hn::Set(d, v.x), hn::Set(d, v.y), hn::Set(d, v.z)}; }
+HWY_INLINE V Square(V a) { return hn::Mul(a, a); }
+
+// Largest extent of the box with half sizes `half` along the unit vector `a`.
+HWY_INLINE V Reach(const V3& a, const V3& half) { return Dot({hn::Abs(a.x), hn::Abs(a.y), hn::Abs(a.z)}, half); }
+
+// Largest cosine that a vector of a box can make with the z axis, from the box's centre and half sizes in a frame whose
+// z is the axis: the highest z over the least distance from the axis (below the horizon: the largest).
+HWY_INLINE V LargestCosine(D d, V x, V y, V z, V half_x, V half_y, V half_z) {
+  const V zero = hn::Zero(d);
+  const V top = hn::Add(z, half_z);
+  const V ax = hn::Abs(x), ay = hn::Abs(y);
+  const V near2 = hn::MulAdd(Square(hn::Max(zero, hn::Sub(ax, half_x))), hn::Set(d, 1.0f),
+                             Square(hn::Max(zero, hn::Sub(ay, half_y))));
+  const V far2 = hn::Add(Square(hn::Add(ax, half_x)), Square(hn::Add(ay, half_y)));
+  const V side2 = hn::IfThenElse(hn::Ge(top, zero), near2, far2);
+  const V norm2 = hn::Add(Square(top), side2);
+  // A box around the origin holds every direction.
+  return hn::IfThenElse(hn::Gt(norm2, hn::Set(d, 1e-30f)), hn::Div(top, hn::Sqrt(hn::Max(norm2, hn::Set(d, 1e-30f)))),
+                        hn::Set(d, 1.0f));
+}
+
+// Cosine of (angle − half-angle), at least 0 degrees: the best any direction of the cone can do.
+HWY_INLINE V WidenByCone(D d, V cosine, V cos_half, V sin_half) {
+  const V one = hn::Set(d, 1.0f);
+  const V sine = hn::Sqrt(hn::Max(hn::Zero(d), hn::NegMulAdd(cosine, cosine, one)));
+  const V wide = hn::MulAdd(cosine, cos_half, hn::Mul(sine, sin_half));
+  return hn::IfThenElse(hn::Ge(cosine, cos_half), one, wide);
+}
+
+// Largest cosine between `axis` (one of each lane, with its frame) and the directions to the node's box.
+HWY_INLINE V CosineToBox(D d, const V3& to_center, const V3& half, const V3& tangent, const V3& bitangent,
+                         const V3& axis) {
+  return LargestCosine(d, Dot(to_center, tangent), Dot(to_center, bitangent), Dot(to_center, axis),
+                       Reach(tangent, half), Reach(bitangent, half), Reach(axis, half));
+}
+
+template <VplKind kKind, bool kGlossy>
+HWY_INLINE void Bounds(const LightNode& node, const PointBlock& block, float clamp2, float* HWY_RESTRICT bounds) {
+  const D d;
+  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  const V3 center = Set3(d, node.center), half = Set3(d, node.half), axis = Set3(d, node.axis);
+  const V cos_half = hn::Set(d, node.cos_half), sin_half = hn::Set(d, node.sin_half);
+  for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
+    const V3 normal = Load3(d, block.normal, i);
+    V cosine, geometry;  // at the surface; at the light, with the distance
+    V3 to_center = {zero, zero, zero};
+    if constexpr (kKind == VplKind::directional) {
+      cosine = WidenByCone(d, hn::Neg(Dot(normal, axis)), cos_half, sin_half);
+      geometry = one;
+    } else {
+      const V3 position = Load3(d, block.position, i);
+      to_center = {hn::Sub(center.x, position.x), hn::Sub(center.y, position.y), hn::Sub(center.z, position.z)};
+      const V dx = hn::Max(zero, hn::Sub(hn::Abs(to_center.x), half.x));
+      const V dy = hn::Max(zero, hn::Sub(hn::Abs(to_center.y), half.y));
+      const V dz = hn::Max(zero, hn::Sub(hn::Abs(to_center.z), half.z));
+      const V dist2 = hn::Add(Square(dx), hn::Add(Square(dy), Square(dz)));
+      geometry = hn::Div(one, hn::Max(hn::Max(dist2, hn::Set(d, clamp2)), hn::Set(d, 1e-30f)));
+      if constexpr (kKind == VplKind::oriented || kKind == VplKind::spot) {
+        // From the lights to the point: the box turned around.
+        const V x = hn::Neg(Dot(to_center, Set3(d, node.tangent))),
+                y = hn::Neg(Dot(to_center, Set3(d, node.bitangent)));
+        const V z = hn::Neg(Dot(to_center, axis));
+        const V c = LargestCosine(d, x, y, z, hn::Set(d, node.frame_half.x), hn::Set(d, node.frame_half.y),
+                                  hn::Set(d, node.frame_half.z));
+        if constexpr (kKind == VplKind::oriented) {
+          geometry = hn::Mul(geometry, hn::Max(zero, WidenByCone(d, c, cos_half, sin_half)));
+        } else {
+          geometry = hn::IfThenElseZero(hn::Ge(hn::Add(c, hn::Set(d, 1e-5f)), cos_half), geometry);
+        }
+      }
+      cosine = CosineToBox(d, to_center, half, Load3(d, block.tangent, i), Load3(d, block.bitangent, i), normal);
+    }
+    geometry = hn::Mul(geometry, hn::Max(zero, cosine));
+    V3 f = Load3(d, block.diffuse, i);
+    if constexpr (kGlossy) {
+      const V3 mirror = Load3(d, block.mirror, i), specular = Load3(d, block.specular, i);
+      V beta;
+      if constexpr (kKind == VplKind::directional)
+        beta = WidenByCone(d, hn::Neg(Dot(mirror, axis)), cos_half, sin_half);
+      else
+        beta = CosineToBox(d, to_center, half, Load3(d, block.mirror_tangent, i), Load3(d, block.mirror_bitangent, i),
+                           mirror);
+      // Rounding of the cosine is magnified by the exponent: a part in 10^6 of slack before it.
+      beta = hn::Min(one, hn::MulAdd(beta, hn::Set(d, 1.000001f), hn::Set(d, 1e-6f)));
+      const V base = hn::Max(beta, hn::Set(d, 1e-20f));
+      V lobe = hn::Exp(d, hn::Max(hn::Mul(hn::Load(d, block.shininess + i), hn::Log(d, base)), hn::Set(d, -80.0f)));
+      lobe = hn::IfThenElseZero(hn::Gt(beta, zero), lobe);
+      f = {hn::MulAdd(specular.x, lobe, f.x), hn::MulAdd(specular.y, lobe, f.y), hn::MulAdd(specular.z, lobe, f.z)};
+    }
+    // Rec.709 weights, with a slack of 1e-4 for the rounding of all this.
+    const V3 weight = Set3(d, {0.2126f * 1.0001f * node.intensity.x, 0.7152f * 1.0001f * node.intensity.y,
+                               0.0722f * 1.0001f * node.intensity.z});
+    hn::Store(hn::Mul(geometry, Dot(f, weight)), d, bounds + i);
+  }
+}
+
+template <VplKind kKind>
+HWY_INLINE void BoundsOfKind(const LightNode& node, const PointBlock& block, float clamp2, float* bounds) {
+  block.glossy ? Bounds<kKind, true>(node, block, clamp2, bounds) : Bounds<kKind, false>(node, block, clamp2, bounds);
+}
+
+void LightNodeBounds(const LightNode& node, const PointBlock& block, float clamp2, float* bounds) {
+  switch (node.kind) {
+    case VplKind::omni:
+      return BoundsOfKind<VplKind::omni>(node, block, clamp2, bounds);
+    case VplKind::oriented:
+      return BoundsOfKind<VplKind::oriented>(node, block, clamp2, bounds);
+    case VplKind::directional:
+      return BoundsOfKind<VplKind::directional>(node, block, clamp2, bounds);
+    case VplKind::spot:
+      return BoundsOfKind<VplKind::spot>(node, block, clamp2, bounds);
+  }
+}
+
+}  // namespace lumicut::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace lumicut {
+HWY_EXPORT(LightNodeBounds);
+
+void light_node_bounds(const LightNode& node, const PointBlock& block, float clamp2, float* bounds) {
+  HWY_DYNAMIC_DISPATCH(LightNodeBounds)(node, block, clamp2, bounds);
+}
+
+void PointBlock::load(const ShadePoints& points, size_t first) {
+  glossy = points.glossy();
+  for (size_t i = 0; i < kLanes; ++i) {
+    const SurfacePoint p = points.get(first + i);
+    const Frame n(p.normal), m(p.mirror);
+    for (int k = 0; k < 3; ++k) {
+      position[k][i] = p.position[k];
+      normal[k][i] = p.normal[k], tangent[k][i] = n.t[k], bitangent[k][i] = n.b[k];
+      mirror[k][i] = p.mirror[k], mirror_tangent[k][i] = m.t[k], mirror_bitangent[k][i] = m.b[k];
+      diffuse[k][i] = p.diffuse[k], specular[k][i] = p.specular[k];
+    }
+    shininess[i] = p.shininess;
+  }
+}
+
+}  // namespace lumicut
+#endif
