@@ -245,7 +245,7 @@ class SceneReader {
     colour("diffuse", m.diffuse, 1);
     colour("specular", m.specular, 1);
     colour("emission", m.emission, 1e15);
-    m.shininess = static_cast<float>(object.number("shininess", static_cast<double>(m.shininess), 0, 1e7));
+    m.shininess = static_cast<float>(object.number("shininess", static_cast<double>(m.shininess), 0, 1e6));
     if (auto opacity = object.find("opacity")) m.opacity = std::max(kHole, static_cast<float>(opacity->number(0, 1)));
     if (auto model = object.find("model"))
       m.flags = (m.flags & ~uint32_t{LUMICUT_PHONG}) |

@@ -143,7 +143,7 @@ void read_mtl(const std::string& path, ObjModel& model, TextureStore& textures) 
     if (clipped)
       model.warnings.push_back(
           fmt::format("{}: {} reflects more than it receives; Kd and Ks are cut to 1", path, user));
-    m.shininess = mtl.shininess;
+    m.shininess = std::min(mtl.shininess, 1e6f);
     m.opacity = std::clamp(mtl.dissolve, kHole, 1.0f);
     if (mtl.illum == 7) {
       m.opacity = kHole;

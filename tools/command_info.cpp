@@ -1,0 +1,96 @@
+// lumicut info: the library as it describes itself.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "io/library.h"
+#include "tools/commands.h"
+
+namespace lumicut::tools {
+
+using nlohmann::ordered_json;
+
+namespace {
+
+ordered_json parameters(const io::Api& api, const char* integrator, uint32_t count) {
+  static const char* const kTypes[] = {"float", "int", "bool", "choice"};
+  ordered_json list = ordered_json::array();
+  for (uint32_t i = 0; i < count; ++i) {
+    lumicut_param_info p{};
+    p.struct_size = sizeof(p);
+    io::check(api, api.get_param_info(integrator, i, &p), "parameter information");
+    ordered_json entry = {{"id", p.id}, {"type", p.type < 4 ? kTypes[p.type] : "?"}, {"default", p.default_text}};
+    if (p.type <= LUMICUT_INT) entry["minimum"] = p.minimum, entry["maximum"] = p.maximum;
+    if (p.type == LUMICUT_CHOICE) entry["choices"] = p.choices;
+    entry["unit"] = p.unit, entry["label"] = p.label, entry["description"] = p.description;
+    list.push_back(entry);
+  }
+  return list;
+}
+
+ordered_json describe(const io::Library& library) {
+  const io::Api& api = library.api();
+  uint32_t major = 0, minor = 0;
+  ordered_json all = {{"version", api.version(&major, &minor)}};
+  all["abi"] = fmt::format("{}.{}", major, minor);
+  all["library"] = library.path();
+  all["integrators"] = ordered_json::array();
+  for (uint32_t i = 0;; ++i) {
+    lumicut_integrator_info info{};
+    info.struct_size = sizeof(info);
+    if (api.get_integrator_info(i, &info) != LUMICUT_OK) break;
+    all["integrators"].push_back({{"id", info.id},
+                                  {"label", info.label},
+                                  {"description", info.description},
+                                  {"source", info.source},
+                                  {"parameters", parameters(api, info.id, info.param_count)}});
+  }
+  all["channels"] = ordered_json::array();
+  for (uint32_t i = 0;; ++i) {
+    lumicut_channel_info info{};
+    info.struct_size = sizeof(info);
+    if (api.get_channel_info(i, &info) != LUMICUT_OK) break;
+    all["channels"].push_back(
+        {{"name", info.name}, {"components", info.components}, {"description", info.description}});
+  }
+  return all;
+}
+
+std::string text(const ordered_json& value) { return value.get<std::string>(); }
+
+void print_text(const ordered_json& all) {
+  fmt::print("lumicut {}, ABI {}, {}\n", text(all["version"]), text(all["abi"]), text(all["library"]));
+  for (const auto& integrator : all["integrators"]) {
+    fmt::print("\n{}: {}\n  {}\n", text(integrator["id"]), text(integrator["description"]), text(integrator["source"]));
+    for (const auto& p : integrator["parameters"]) {
+      std::string range = text(p["type"]);
+      if (p.contains("minimum"))
+        range = fmt::format("{} to {}", p["minimum"].get<double>(), p["maximum"].get<double>());
+      if (p.contains("choices")) range = text(p["choices"]);
+      if (!text(p["unit"]).empty()) range += " " + text(p["unit"]);
+      fmt::print("  -p {:<28} {} ({})\n", text(p["id"]) + "=" + text(p["default"]), text(p["description"]), range);
+    }
+  }
+  fmt::print("\nlayers of an image:\n");
+  for (const auto& c : all["channels"]) fmt::print("  {:<12} {}\n", text(c["name"]), text(c["description"]));
+}
+
+}  // namespace
+
+void add_info(CLI::App& app) {
+  auto* command = app.add_subcommand("info", "Version, integrators and their parameters");
+  const auto json = std::make_shared<bool>(false);
+  command->add_flag("--json", *json, "Print JSON instead of text");
+  command->callback([json] {
+    const io::Library library;
+    const auto all = describe(library);
+    if (*json) {
+      fmt::print("{}\n", all.dump(2));
+    } else {
+      print_text(all);
+    }
+  });
+}
+
+}  // namespace lumicut::tools

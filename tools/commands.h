@@ -1,0 +1,41 @@
+// What the subcommands of `lumicut` share.
+#pragma once
+
+#include <csignal>
+#include <stdexcept>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace lumicut::tools {
+
+// Exit codes, documented in docs/command_line.md.
+enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2, kBadFile = 3, kInterrupted = 130 };
+
+// A command line that cannot be obeyed: unknown integrator, parameter or layer.
+class UsageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// Ctrl-C came.
+class Interrupted : public std::runtime_error {
+ public:
+  Interrupted() : std::runtime_error("interrupted; nothing was written") {}
+};
+
+// Set by the first Ctrl-C (or SIGTERM); the second ends the program at once.
+extern volatile std::sig_atomic_t interrupted;
+void catch_interrupts();
+inline void stop_if_interrupted() {
+  if (interrupted) throw Interrupted();
+}
+
+// Each adds its subcommand to the command line; its callback does the work.
+void add_render(CLI::App& app);
+void add_compare(CLI::App& app);
+void add_info(CLI::App& app);
+
+}  // namespace lumicut::tools

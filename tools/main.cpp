@@ -1,0 +1,65 @@
+// lumicut: renders scenes with many lights, compares images, tells what the library offers. See docs/command_line.md.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <new>
+
+#include "io/file_error.h"
+#include "io/library.h"
+#include "tools/commands.h"
+
+namespace lumicut::tools {
+
+volatile std::sig_atomic_t interrupted = 0;
+
+void catch_interrupts() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { interrupted = 1; };
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+namespace {
+
+int run(int argc, char** argv) {
+  CLI::App app(
+      "Lumicut renders global illumination from many virtual lights.\n\n"
+      "  lumicut info                                         what the library offers\n"
+      "  lumicut render scene.json -i lightcuts -o out.exr    an image\n"
+      "  lumicut render scene.json -i exhaustive -o ref.exr   the same from all lights: the reference\n"
+      "  lumicut compare out.exr ref.exr                      how far the one is from the other\n");
+  app.name("lumicut");
+  app.require_subcommand(1);
+  app.footer(
+      "Exit codes: 0 done, 1 failed, 2 wrong command line, 3 a file is missing, wrong or cannot be written, 130 "
+      "interrupted.");
+  add_render(app);
+  add_compare(app);
+  add_info(app);
+  const auto complain = [](const char* text, int code) {
+    fmt::print(stderr, "lumicut: {}\n", text);
+    return code;
+  };
+  try {
+    app.parse(argc, argv);
+    return kOk;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kOk : kUsage;  // --help is an error of code 0
+  } catch (const Interrupted& error) {
+    return complain(error.what(), kInterrupted);
+  } catch (const UsageError& error) {
+    return complain(error.what(), kUsage);
+  } catch (const io::FileError& error) {
+    return complain(error.what(), kBadFile);
+  } catch (const std::bad_alloc&) {
+    return complain("out of memory", kFailed);
+  } catch (const std::exception& error) {
+    return complain(error.what(), kFailed);
+  }
+}
+
+}  // namespace
+}  // namespace lumicut::tools
+
+int main(int argc, char** argv) { return lumicut::tools::run(argc, argv); }
