@@ -42,16 +42,18 @@ HWY_INLINE V LargestCosine(D d, V x, V y, V z, V half_x, V half_y, V half_z) {
   const V far2 = hn::Add(Square(hn::Add(ax, half_x)), Square(hn::Add(ay, half_y)));
   const V side2 = hn::IfThenElse(hn::Ge(top, zero), near2, far2);
   const V norm2 = hn::Add(Square(top), side2);
-  // A box around the origin holds every direction.
-  return hn::IfThenElse(hn::Gt(norm2, hn::Set(d, 1e-30f)), hn::Div(top, hn::Sqrt(hn::Max(norm2, hn::Set(d, 1e-30f)))),
-                        hn::Set(d, 1.0f));
+  // A box around the origin holds every direction. Near the horizon cosines cancel: an absolute slack for their
+  // rounding.
+  const V cosine = hn::IfThenElse(hn::Gt(norm2, hn::Set(d, 1e-30f)),
+                                  hn::Div(top, hn::Sqrt(hn::Max(norm2, hn::Set(d, 1e-30f)))), hn::Set(d, 1.0f));
+  return hn::Add(cosine, hn::Set(d, 2e-6f));
 }
 
 // Cosine of (angle − half-angle), at least 0 degrees: the best any direction of the cone can do.
 HWY_INLINE V WidenByCone(D d, V cosine, V cos_half, V sin_half) {
   const V one = hn::Set(d, 1.0f);
   const V sine = hn::Sqrt(hn::Max(hn::Zero(d), hn::NegMulAdd(cosine, cosine, one)));
-  const V wide = hn::MulAdd(cosine, cos_half, hn::Mul(sine, sin_half));
+  const V wide = hn::Add(hn::MulAdd(cosine, cos_half, hn::Mul(sine, sin_half)), hn::Set(d, 2e-6f));
   return hn::IfThenElse(hn::Ge(cosine, cos_half), one, wide);
 }
 
@@ -118,7 +120,7 @@ HWY_INLINE void Bounds(const LightNode& node, const PointBlock& block, float cla
     // Rec.709 weights, with a slack of 1e-4 for the rounding of all this.
     const V3 weight = Set3(d, {0.2126f * 1.0001f * node.intensity.x, 0.7152f * 1.0001f * node.intensity.y,
                                0.0722f * 1.0001f * node.intensity.z});
-    hn::Store(hn::Mul(geometry, Dot(f, weight)), d, bounds + i);
+    hn::StoreU(hn::Mul(geometry, Dot(f, weight)), d, bounds + i);
   }
 }
 

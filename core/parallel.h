@@ -3,11 +3,13 @@
 #pragma once
 
 #include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cstddef>
+#include <memory>
 #include <utility>
 
 namespace lumicut {
@@ -25,7 +27,12 @@ void parallel_chunks(size_t n, size_t chunk, Fn&& fn) {
 class Arena {
  public:
   // 0: all hardware threads.
-  explicit Arena(int threads) : arena_(threads > 0 ? threads : hardware_threads()) {}
+  explicit Arena(int threads) : arena_(threads > 0 ? threads : hardware_threads()) {
+    // oneTBB has no more workers than cores unless told so.
+    if (arena_.max_concurrency() > hardware_threads())
+      control_ =
+          std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, arena_.max_concurrency());
+  }
   int threads() const { return arena_.max_concurrency(); }
   template <typename Fn>
   auto run(Fn&& fn) {
@@ -34,6 +41,7 @@ class Arena {
 
  private:
   tbb::task_arena arena_;
+  std::unique_ptr<tbb::global_control> control_;
 };
 
 }  // namespace lumicut

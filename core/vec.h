@@ -139,10 +139,12 @@ struct Transform {
     return {m[0] * v.x + m[1] * v.y + m[2] * v.z, m[4] * v.x + m[5] * v.y + m[6] * v.z,
             m[8] * v.x + m[9] * v.y + m[10] * v.z};
   }
-  // Normals map by the cofactor matrix: right also for mirrored and nonuniformly scaled instances (not normalised).
+  // Normals map by the inverse transpose, up to a positive factor: right under nonuniform scale, and the front stays
+  // the front under mirroring. Not normalised.
   Vec3f normal(const Vec3f& n) const {
     const Vec3f c0{m[0], m[4], m[8]}, c1{m[1], m[5], m[9]}, c2{m[2], m[6], m[10]};
-    return cross(c1, c2) * n.x + cross(c2, c0) * n.y + cross(c0, c1) * n.z;
+    const Vec3f r = cross(c1, c2) * n.x + cross(c2, c0) * n.y + cross(c0, c1) * n.z;
+    return dot(c0, cross(c1, c2)) < 0.0f ? -r : r;
   }
 };
 

@@ -1,0 +1,150 @@
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "core/error.h"
+#include "tests/support/test_scenes.h"
+
+namespace lumicut {
+
+namespace {
+
+std::string error_of(const std::function<void()>& fn) {
+  try {
+    fn();
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+Mesh triangle() {
+  Mesh m;
+  m.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  m.indices = {0, 1, 2};
+  return m;
+}
+
+RayHit down(float x, float y) {
+  RayHit r;
+  r.ray.org = {x, y, 5};
+  r.ray.dir = {0, 0, -1};
+  return r;
+}
+
+}  // namespace
+
+TEST(Scene, EmptySceneCommitsAndHitsNothing) {
+  Scene scene{{}};
+  Progress progress;
+  scene.commit(progress);
+  RayHit r = down(0, 0);
+  scene.accel().intersect({&r, 1});
+  EXPECT_EQ(r.hit.geom, kNoId);
+  EXPECT_EQ(scene.radius(), 1.0f);
+}
+
+TEST(Scene, ErrorsNameFieldAndValue) {
+  Scene scene{{}};
+  Mesh m = triangle();
+  m.indices[1] = 3;
+  EXPECT_NE(error_of([&] { scene.add_mesh(m); }).find("index[1] = 3"), std::string::npos);
+  m = triangle();
+  m.positions[2].y = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_NE(error_of([&] { scene.add_mesh(m); }).find("position[2]"), std::string::npos);
+  m = triangle();
+  m.material = 4;
+  scene.add_mesh(m);
+  Progress progress;
+  EXPECT_NE(error_of([&] { scene.commit(progress); }).find("material 4"), std::string::npos);
+  EXPECT_FALSE(scene.committed());
+}
+
+TEST(Scene, InstancesAreSeenWhereTheirTransformsPutThem) {
+  Scene scene{{}};
+  scene.set_materials({Material{}});
+  Mesh m = triangle();
+  Transform moved;
+  moved.m[3] = 10;
+  Transform mirrored;  // x -> -x, turns the winding over
+  mirrored.m[0] = -1;
+  m.instances = {Transform{}, moved, mirrored};
+  scene.add_mesh(m);
+  Progress progress;
+  scene.commit(progress);
+  for (const auto& [x, inst] : {std::pair{0.2f, 0u}, {10.2f, 1u}, {-0.2f, 2u}}) {
+    RayHit r = down(x, 0.2f);
+    scene.accel().intersect({&r, 1});
+    ASSERT_NE(r.hit.geom, kNoId) << x;
+    EXPECT_EQ(r.hit.inst, inst);
+    const SurfaceHit s = scene.surface(r);
+    EXPECT_NEAR(s.position.x, x, 1e-5f);
+    EXPECT_EQ(s.geometric_normal, (Vec3f{0, 0, 1})) << "the front stays the front, mirrored or not";
+  }
+}
+
+TEST(Scene, CutOutsLetRaysThrough) {
+  Scene scene{{}};
+  const uint8_t mask[] = {255, 0};  // left opaque, right a hole
+  scene.set_textures({Texture(2, 1, 1, Texture::Format::uint8, {.clamp = true, .nearest = true}, mask)});
+  Material m;
+  m.opacity_texture = 0;
+  scene.set_materials({m});
+  Mesh mesh;
+  test::add_quad(mesh, {0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, 0);
+  mesh.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  scene.add_mesh(mesh);
+  Progress progress;
+  scene.commit(progress);
+  RayHit rays[] = {down(0.25f, 0.5f), down(0.75f, 0.4f)};
+  scene.accel().intersect(rays);
+  EXPECT_EQ(rays[0].hit.geom, 0u);
+  EXPECT_EQ(rays[1].hit.geom, kNoId);
+}
+
+TEST(Scene, UpdateMovesTheMeshAtTheNextCommit) {
+  Scene scene{{}};
+  scene.set_materials({Material{}});
+  const uint32_t id = scene.add_mesh(triangle());
+  Progress progress;
+  scene.commit(progress);
+  const auto version = scene.version();
+  scene.update_mesh(id, {{5, 0, 0}, {6, 0, 0}, {5, 1, 0}}, {}, {});
+  scene.commit(progress);
+  EXPECT_GT(scene.version(), version);
+  RayHit rays[] = {down(0.2f, 0.2f), down(5.2f, 0.2f)};
+  scene.accel().intersect(rays);
+  EXPECT_EQ(rays[0].hit.geom, kNoId);
+  EXPECT_EQ(rays[1].hit.geom, 0u);
+  EXPECT_THROW(scene.update_mesh(id, {{0, 0, 0}}, {}, {}), Error);
+}
+
+TEST(Scene, ShadingIsTwoSidedAndPointsStandOffTheSurface) {
+  const auto room = test::make_room();
+  const Vec3f n{0, 0, 1};
+  for (float side : {1.0f, -1.0f}) {
+    const SurfacePoint p = room->shade_point({0, 0, 0}, n, n, {}, 0, {0, 0, side}, 0);
+    EXPECT_EQ(p.normal.z, side);
+    EXPECT_NEAR(p.position.z, side * room->epsilon(), 1e-12f);
+  }
+}
+
+TEST(Scene, EnvironmentMapFollowsItsFormula) {
+  // Four texels around the equator; map space is z up.
+  const float pixels[] = {1, 2, 3, 4};
+  Scene scene{{}};
+  scene.set_textures({Texture(4, 1, 1, Texture::Format::float32, {.nearest = true}, pixels)});
+  Environment env;
+  env.color = {1, 1, 1};
+  env.texture = 0;
+  scene.set_environment(env);
+  const auto at = [&](float azimuth) {
+    return scene.environment_radiance({std::cos(azimuth), std::sin(azimuth), 0}).x;
+  };
+  EXPECT_EQ(at(0.1f), 2.0f);   // u = 0.5 - small
+  EXPECT_EQ(at(-0.1f), 3.0f);  // u = 0.5 + small
+  EXPECT_EQ(at(3.0f), 1.0f);
+  EXPECT_EQ(at(-3.0f), 4.0f);
+}
+
+}  // namespace lumicut

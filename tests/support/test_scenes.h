@@ -1,0 +1,86 @@
+// Small scenes in code, for tests of what lies below the C ABI.
+#pragma once
+
+#include <memory>
+
+#include "core/rng.h"
+#include "scene/scene.h"
+#include "vpl/vpl.h"
+
+namespace lumicut::test {
+
+inline Vec3f random_direction(Rng& rng) {
+  const float z = 2.0f * rng.next_float() - 1.0f, phi = 6.2831853f * rng.next_float(),
+              r = std::sqrt(std::max(0.0f, 1.0f - z * z));
+  return {r * std::cos(phi), r * std::sin(phi), z};
+}
+
+inline Vec3f random_point(Rng& rng, float half) {
+  return {half * (2.0f * rng.next_float() - 1.0f), half * (2.0f * rng.next_float() - 1.0f),
+          half * (2.0f * rng.next_float() - 1.0f)};
+}
+
+inline void add_quad(Mesh& mesh, Vec3f a, Vec3f b, Vec3f c, Vec3f d, uint32_t material) {
+  const auto base = static_cast<uint32_t>(mesh.positions.size());
+  mesh.positions.insert(mesh.positions.end(), {a, b, c, d});
+  mesh.indices.insert(mesh.indices.end(), {base, base + 1, base + 2, base, base + 2, base + 3});
+  mesh.triangle_materials.insert(mesh.triangle_materials.end(), {material, material});
+}
+
+// Axis-aligned box whose faces look outwards, or inwards.
+inline void add_box(Mesh& mesh, Vec3f lo, Vec3f hi, uint32_t material, bool inwards) {
+  const Vec3f v[8] = {{lo.x, lo.y, lo.z}, {hi.x, lo.y, lo.z}, {hi.x, hi.y, lo.z}, {lo.x, hi.y, lo.z},
+                      {lo.x, lo.y, hi.z}, {hi.x, lo.y, hi.z}, {hi.x, hi.y, hi.z}, {lo.x, hi.y, hi.z}};
+  const int faces[6][4] = {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {3, 7, 6, 2}, {0, 4, 7, 3}, {1, 2, 6, 5}};
+  for (const auto& f : faces) {
+    if (inwards)
+      add_quad(mesh, v[f[3]], v[f[2]], v[f[1]], v[f[0]], material);
+    else
+      add_quad(mesh, v[f[0]], v[f[1]], v[f[2]], v[f[3]], material);
+  }
+}
+
+inline Material diffuse(float r, float g, float b) {
+  Material m;
+  m.diffuse = {r, g, b};
+  return m;
+}
+
+// A room of side 2 around the origin (times `scale`) with two blocks, a glossy floor, an upward area lamp and a spot.
+inline std::unique_ptr<Scene> make_room(float scale = 1.0f, const std::string& accel = "embree") {
+  auto scene = std::make_unique<Scene>(Scene::Config{accel, true});
+  Material glossy = diffuse(0.3f, 0.3f, 0.3f);
+  glossy.specular = {0.4f, 0.4f, 0.4f};
+  glossy.shininess = 60.0f;
+  scene->set_materials({diffuse(0.7f, 0.7f, 0.7f), diffuse(0.7f, 0.15f, 0.1f), diffuse(0.1f, 0.6f, 0.2f), glossy});
+  Mesh mesh;
+  add_box(mesh, Vec3f{-1, -1, -1} * scale, Vec3f{1, 1, 1} * scale, 0, true);
+  mesh.triangle_materials[8] = mesh.triangle_materials[9] = 1;
+  mesh.triangle_materials[10] = mesh.triangle_materials[11] = 2;
+  mesh.triangle_materials[0] = mesh.triangle_materials[1] = 3;
+  add_box(mesh, Vec3f{-0.6f, -0.1f, -1.0f} * scale, Vec3f{-0.1f, 0.5f, -0.2f} * scale, 0, false);
+  add_box(mesh, Vec3f{0.2f, -0.5f, -1.0f} * scale, Vec3f{0.6f, 0.1f, -0.5f} * scale, 1, false);
+  scene->add_mesh(std::move(mesh));
+  Light lamp;
+  lamp.type = LightType::rectangle;
+  lamp.position = Vec3f{0, 0.5f, 0.3f} * scale;
+  lamp.u = Vec3f{0.4f, 0, 0} * scale, lamp.v = Vec3f{0, 0.4f, 0} * scale;  // shines at the ceiling
+  lamp.value = {20, 18, 15};
+  Light spot;
+  spot.type = LightType::spot;
+  spot.position = Vec3f{0.5f, -0.7f, 0.9f} * scale;
+  spot.direction = normalize(Vec3f{-0.4f, 0.6f, -1.0f});
+  spot.cos_outer = 0.8f, spot.blend_cosine = 0.1f;
+  spot.value = Rgb{2, 2, 3} * (scale * scale);
+  scene->set_lights({lamp, spot});
+  Camera camera;
+  camera.position = Vec3f{0, -0.95f, 0.1f} * scale;
+  camera.right = {1, 0, 0}, camera.forward = {0, 1, 0}, camera.up = {0, 0, 1};
+  camera.tan_half_fov_y = 0.7f;
+  scene->set_camera(camera);
+  Progress progress;
+  scene->commit(progress);
+  return scene;
+}
+
+}  // namespace lumicut::test

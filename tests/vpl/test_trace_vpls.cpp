@@ -1,0 +1,106 @@
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <numbers>
+
+#include "core/error.h"
+#include "tests/support/test_scenes.h"
+#include "vpl/trace_vpls.h"
+
+namespace lumicut {
+
+namespace {
+
+// A closed box of one albedo, with a point lamp inside.
+std::unique_ptr<Scene> closed_box(float albedo) {
+  auto scene = std::make_unique<Scene>(Scene::Config{});
+  scene->set_materials({test::diffuse(albedo, albedo, albedo)});
+  Mesh mesh;
+  test::add_box(mesh, {-1, -1, -1}, {1, 1, 1}, 0, true);
+  scene->add_mesh(mesh);
+  Light l;
+  l.position = {0.2f, -0.1f, 0.3f};
+  l.value = {1, 1, 1};
+  scene->set_lights({l});
+  Progress progress;
+  scene->commit(progress);
+  return scene;
+}
+
+}  // namespace
+
+TEST(TraceVpls, ClosedBoxReflectsTheGeometricSeriesOfItsAlbedo) {
+  // Flux that leaves the walls: Φ(ρ + ρ² + …) = Φρ/(1−ρ). An oriented VPL of intensity I emits πI.
+  for (float albedo : {0.2f, 0.5f, 0.8f}) {
+    const auto scene = closed_box(albedo);
+    Progress progress;
+    const VplSet set = trace_vpls(*scene, {.count = 100000, .max_depth = 200}, progress);
+    double flux = 0;
+    for (const Vpl& v : set.lights)
+      if (v.kind == VplKind::oriented) flux += std::numbers::pi * v.intensity.x;
+    const double expected = 4 * std::numbers::pi * albedo / (1 - albedo);
+    EXPECT_NEAR(flux / expected, 1.0, 0.02) << albedo;  // 100k VPLs of path lengths that vary by their mean: 0.7 %
+    EXPECT_NEAR(static_cast<double>(set.lights.size()), 100000, 1000);
+  }
+}
+
+TEST(TraceVpls, DepthLimitCutsTheSeries) {
+  const auto scene = closed_box(0.5f);
+  Progress progress;
+  const VplSet one = trace_vpls(*scene, {.count = 20000, .max_depth = 1}, progress);
+  double flux = 0;
+  for (const Vpl& v : one.lights)
+    if (v.kind == VplKind::oriented) flux += std::numbers::pi * v.intensity.x;
+  EXPECT_NEAR(flux, 4 * std::numbers::pi * 0.5, 1e-2);  // every path meets exactly one wall: rounding only
+  const VplSet none = trace_vpls(*scene, {.count = 20000, .max_depth = 0}, progress);
+  EXPECT_EQ(none.lights.size(), 1u) << "the lamp itself";
+}
+
+TEST(TraceVpls, SameLightsOnOneAndFourThreads) {
+  const auto scene = test::make_room();
+  std::vector<Vpl> first;
+  for (int threads : {1, 4}) {
+    Arena arena(threads);
+    Progress progress;
+    const VplSet set = arena.run([&] { return trace_vpls(*scene, {.count = 30000}, progress); });
+    if (first.empty()) first = set.lights;
+    ASSERT_EQ(set.lights.size(), first.size());
+    EXPECT_EQ(std::memcmp(set.lights.data(), first.data(), first.size() * sizeof(Vpl)), 0);
+  }
+}
+
+TEST(TraceVpls, SeedsDiffer) {
+  const auto scene = test::make_room();
+  Progress progress;
+  const VplSet a = trace_vpls(*scene, {.count = 1000, .seed = 1}, progress),
+               b = trace_vpls(*scene, {.count = 1000, .seed = 2}, progress);
+  EXPECT_NE(std::memcmp(a.lights.data(), b.lights.data(), 900 * sizeof(Vpl)), 0);
+}
+
+TEST(TraceVpls, DarkSceneGivesNoLightsAndAnOpenSceneEnds) {
+  Scene dark{{}};
+  Progress progress;
+  dark.commit(progress);
+  EXPECT_TRUE(trace_vpls(dark, {}, progress).lights.empty());
+  Scene open{{}};
+  open.set_materials({Material{}});
+  Mesh mesh;
+  test::add_quad(mesh, {0, 0, 0}, {1e-3f, 0, 0}, {1e-3f, 1e-3f, 0}, {0, 1e-3f, 0}, 0);
+  open.add_mesh(mesh);
+  Light l;
+  l.position = {0, 0, 100};
+  l.value = {1, 1, 1};
+  open.set_lights({l});
+  open.commit(progress);
+  const VplSet set = trace_vpls(open, {.count = 1000}, progress);
+  EXPECT_LT(set.lights.size(), 100u);  // nearly all paths miss; what matters is that it ends
+}
+
+TEST(TraceVpls, StopsWhenCancelled) {
+  const auto scene = test::make_room();
+  Progress progress;
+  progress.cancel();
+  EXPECT_THROW(trace_vpls(*scene, {.count = 1000000}, progress), Error);
+}
+
+}  // namespace lumicut
