@@ -72,43 +72,18 @@ template <class Policy>
 class Core {
  public:
   Core(const Policy& policy, size_t n, bool threads, Progress* progress)
-      : policy_(policy), n_(n), next_(static_cast<uint32_t>(n)), threads_(threads), progress_(progress) {
-    features_ = hwy::AllocateAligned<float>(std::max<size_t>(1, (2 * n) * k()));
-    if (!features_)
-      throw Error(ErrorCode::out_of_memory, "agglomerate: no memory for " + std::to_string(n) + " leaves");
-    least_.resize(2 * n);
-    std::iota(least_.begin(), least_.begin() + static_cast<ptrdiff_t>(n), 0u);
-    merges_.resize(n > 0 ? n - 1 : 0);
+      : policy_(policy), n_(n), threads_(threads), progress_(progress) {
+    features_ = hwy::AllocateAligned<float>(std::max<size_t>(1, n * k()));
+    if (!features_) throw Error(ErrorCode::out_of_memory, "agglomerate: no memory for " + std::to_string(n) + " leaves");
+    least_.resize(n);
+    std::iota(least_.begin(), least_.end(), 0u);
+    node_ = least_;
+    merges_.reserve(n > 0 ? n - 1 : 0);
   }
 
   float* leaf(size_t i) { return features_.get() + i * k(); }
 
-  std::vector<Merge> run(Strategy strategy) {
-    check();
-    std::vector<uint32_t> active = join_coincident();
-    if constexpr (!Policy::kNonDecreasing)
-      if (strategy == Strategy::locally_ordered || strategy == Strategy::parallel)
-        throw Error(
-            ErrorCode::invalid_argument,
-            "agglomerate: locally ordered strategies need a dissimilarity that never falls as clusters grow (Eq. 1)");
-    if (active.size() > 1) {
-      if (strategy == Strategy::naive) naive(std::move(active));
-      if (strategy == Strategy::heap) heap(std::move(active));
-      if (strategy == Strategy::locally_ordered) chain(std::move(active));
-      if (strategy == Strategy::parallel) rounds(std::move(active));
-    }
-    return canonical();
-  }
-
- private:
-  size_t k() const {
-    if constexpr (Policy::kFeatures > 0) return Policy::kFeatures;
-    return policy_.features();
-  }
-  const float* of(uint32_t cluster) const { return features_.get() + static_cast<size_t>(cluster) * k(); }
-  void check() const {
-    if (progress_ != nullptr) progress_->check();
-  }
+  // fn(begin, end), in parallel where the strategy is.
   template <class Fn>
   void for_chunks(size_t n, size_t chunk, Fn&& fn) const {
     if (threads_ && n > chunk) {
@@ -118,11 +93,45 @@ class Core {
     for (size_t begin = 0; begin < n; begin += chunk) fn(begin, std::min(n, begin + chunk));
   }
 
-  // Writes cluster `c`, the union of `a` and `b`.
-  void join(uint32_t a, uint32_t b, uint32_t c, float cost) {
-    policy_.merge(of(a), of(b), features_.get() + static_cast<size_t>(c) * k());
-    least_[c] = std::min(least_[a], least_[b]);
-    merges_[c - n_] = {a, b, cost};
+  std::vector<Merge> run(Strategy strategy) {
+    check();
+    if constexpr (!Policy::kNonDecreasing)
+      if (strategy == Strategy::locally_ordered || strategy == Strategy::parallel)
+        fail_argument("agglomerate: locally ordered strategies need a dissimilarity that never falls as clusters grow (Eq. 1)");
+    std::vector<uint32_t> active = join_coincident();
+    if (active.size() > 1) {
+      if (strategy == Strategy::naive) naive(active);
+      if (strategy == Strategy::heap) heap(active);
+      if (strategy == Strategy::locally_ordered) chain(active);
+      if (strategy == Strategy::parallel) regions(active);
+    }
+    return canonical();
+  }
+
+ private:
+  static constexpr size_t kMaxFeatures = 64;
+
+  size_t k() const {
+    if constexpr (Policy::kFeatures > 0) return Policy::kFeatures;
+    return policy_.features();
+  }
+  // A cluster is known by the leaf whose place in memory it took over; node_ has its id in the tree.
+  const float* of(uint32_t cluster) const { return features_.get() + static_cast<size_t>(cluster) * k(); }
+  void check() const {
+    if (progress_ != nullptr) progress_->check();
+  }
+  // Cluster `a` becomes the union of `a` and `b`, with that id in the tree; `b` is no more.
+  Merge join(uint32_t a, uint32_t b, float cost, uint32_t id) {
+    float joint[kMaxFeatures];
+    policy_.merge(of(a), of(b), joint);
+    std::copy_n(joint, k(), features_.get() + static_cast<size_t>(a) * k());
+    const Merge merge{node_[a], node_[b], cost};
+    least_[a] = std::min(least_[a], least_[b]);
+    node_[a] = id;
+    return merge;
+  }
+  void join(uint32_t a, uint32_t b, float cost) {
+    merges_.push_back(join(a, b, cost, static_cast<uint32_t>(n_ + merges_.size())));
   }
 
   // d(a, b) of one pair.
@@ -136,62 +145,83 @@ class Core {
     return out[0];
   }
 
+  // For each leaf the least one with the same key. Leaves are dealt out by hash, so that each share has a table that fits a cache.
+  std::vector<uint32_t> first_equal() const {
+    const size_t key = policy_.key_features(), shares = n_ / 4096 + 1;
+    std::vector<uint32_t> hashes(n_), first(n_), dealt(n_), start(shares + 1, 0);
+    for_chunks(n_, 4096, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        const float* f = features_.get() + i * k();
+        uint64_t hash = 0;
+        for (size_t j = 0; j < key; ++j) {
+          const float value = f[j] + 0.0f;  // -0 becomes 0
+          uint32_t bits;
+          std::memcpy(&bits, &value, sizeof(bits));
+          hash = (hash ^ bits) * 0x9e3779b97f4a7c15ull;
+          hash ^= hash >> 32;
+        }
+        hashes[i] = static_cast<uint32_t>(hash);
+      }
+    });
+    const auto share_of = [&](size_t i) { return static_cast<size_t>((uint64_t{hashes[i]} * shares) >> 32); };
+    for (size_t i = 0; i < n_; ++i) ++start[share_of(i) + 1];
+    for (size_t s = 0; s < shares; ++s) start[s + 1] += start[s];
+    std::vector<uint32_t> fill(start.begin(), start.end() - 1);
+    for (size_t i = 0; i < n_; ++i) dealt[fill[share_of(i)]++] = static_cast<uint32_t>(i);
+    for_chunks(shares, 1, [&](size_t share, size_t) {
+      check();
+      const size_t count = start[share + 1] - start[share];
+      size_t buckets = 16;
+      while (buckets < 2 * count) buckets *= 2;
+      std::vector<uint32_t> table(buckets, kNone);
+      for (size_t d = start[share]; d < start[share + 1]; ++d) {
+        const uint32_t i = dealt[d];
+        for (size_t at = (hashes[i] * 0x9e3779b1u) & (buckets - 1);; at = (at + 1) & (buckets - 1)) {
+          if (table[at] == kNone) table[at] = i;
+          const uint32_t other = table[at];
+          if (other == i || (hashes[other] == hashes[i] && std::equal(of(i), of(i) + key, of(other)))) {
+            first[i] = other;
+            break;
+          }
+        }
+      }
+    });
+    return first;
+  }
+
   // Joins leaves with equal keys in balanced subtrees; what is left to cluster, in order of least leaf.
   std::vector<uint32_t> join_coincident() {
-    const size_t key = policy_.key_features();
-    size_t buckets = 16;
-    while (buckets < 2 * n_) buckets *= 2;
-    std::vector<uint32_t> table(buckets, kNone), next(n_, kNone), last(n_, kNone);
+    const std::vector<uint32_t> first = first_equal();
+    std::vector<uint32_t> next(n_, kNone), last(first);
     std::vector<uint32_t> active;
     active.reserve(n_);
     for (uint32_t i = 0; i < n_; ++i) {
-      if ((i & 0xffff) == 0) check();
-      uint64_t hash = 0;
-      for (size_t f = 0; f < key; ++f) {
-        const float value = of(i)[f] + 0.0f;  // -0 becomes 0
-        uint32_t bits;
-        std::memcpy(&bits, &value, sizeof(bits));
-        hash = (hash ^ bits) * 0x9e3779b97f4a7c15ull;
-        hash ^= hash >> 32;
-      }
-      for (size_t at = hash & (buckets - 1);; at = (at + 1) & (buckets - 1)) {
-        const uint32_t first = table[at];
-        if (first == kNone) {
-          table[at] = i, last[i] = i;
-          active.push_back(i);
-          break;
-        }
-        if (std::equal(of(i), of(i) + key, of(first))) {
-          next[last[first]] = i, last[first] = i;
-          break;
-        }
+      if (first[i] == i) {
+        active.push_back(i);
+      } else {
+        next[last[first[i]]] = i;
+        last[first[i]] = i;
       }
     }
     std::vector<uint32_t> group;
-    for (uint32_t& cluster : active) {
+    for (const uint32_t cluster : active) {
       if (next[cluster] == kNone) continue;
       group.clear();
       for (uint32_t i = cluster; i != kNone; i = next[i]) group.push_back(i);
       while (group.size() > 1) {  // pair by pair, so that the depth is log2 of their number
         size_t out = 0;
         for (size_t i = 0; i < group.size(); i += 2) {
-          if (i + 1 == group.size()) {
-            group[out++] = group[i];
-            continue;
-          }
-          if ((next_ & 0xfff) == 0) check();
-          join(group[i], group[i + 1], next_, pair_cost(group[i], group[i + 1]));
-          group[out++] = next_++;
+          if ((merges_.size() & 0xfff) == 0) check();
+          if (i + 1 < group.size()) join(group[i], group[i + 1], pair_cost(group[i], group[i + 1]));
+          group[out++] = group[i];
         }
         group.resize(out);
       }
-      cluster = group[0];
     }
     return active;
   }
 
-  // Puts clusters in an order in which runs of 8, 64, 512... lie close together: splits at medians, at multiples of
-  // `unit`.
+  // Puts clusters in an order in which runs of 8, 64, 512... lie close together: splits at medians, at multiples of `unit`.
   struct Item {
     float point[Policy::kOrderDims];
     uint32_t cluster;
@@ -237,12 +267,14 @@ class Core {
     for (size_t i = 0; i < active.size(); ++i) active[i] = items[i].cluster;
   }
 
-  // The active clusters, one a slot, under an implicit tree: block i of level L+1 sums up blocks 8i to 8i+7 of level L,
-  // one a lane, by the least of each feature and the least of their least leaves. [Stands for the paper's kd-tree, Fig.
-  // 3; slots are replaced and emptied in place]
+  // The active clusters, one a slot, under an implicit tree: block i of level L+1 sums up blocks 8i to 8i+7 of level L, one a
+  // lane, by the least of each feature and the least of their least leaves. A block of level L spans 8^(L+1) slots.
+  // [Stands for the paper's kd-tree, Fig. 3; slots are replaced and emptied in place]
   class BestMatchTree {
    public:
-    BestMatchTree(const Core& core) : core_(core), stride_((core.k() + 1) * 8) {}
+    explicit BestMatchTree(const Core& core) : core_(core), stride_((core.k() + 1) * 8) {}
+
+    size_t levels() const { return levels_; }
 
     void build(const std::vector<uint32_t>& active) {
       size_ = active.size();
@@ -254,11 +286,8 @@ class Core {
         if (blocks <= 1) break;
       }
       levels_ = level + 1;
-      if (total * stride_ > capacity_) {
-        capacity_ = total * stride_;
-        data_ = hwy::AllocateAligned<float>(capacity_);
-        if (!data_) throw Error(ErrorCode::out_of_memory, "agglomerate: no memory for the search tree");
-      }
+      used_ = total * stride_;
+      reserve();
       const size_t features = core_.k();
       core_.for_chunks(count_[0], 512, [&](size_t begin, size_t end) {
         for (size_t b = begin; b < end; ++b) {
@@ -281,38 +310,35 @@ class Core {
         });
     }
 
-    // Puts a cluster in the slot, or nothing (kNone).
-    void set(size_t slot, uint32_t cluster) {
+    void copy(const BestMatchTree& other) {
+      size_ = other.size_, levels_ = other.levels_, used_ = other.used_;
+      std::copy_n(other.start_, kMaxLevels, start_);
+      std::copy_n(other.count_, kMaxLevels, count_);
+      reserve();
+      core_.for_chunks(used_, 1 << 16, [&](size_t begin, size_t end) {
+        std::copy(other.data_.get() + begin, other.data_.get() + end, data_.get() + begin);
+      });
+    }
+
+    // Puts a cluster in the slot, or nothing (kNone). Levels above `top` are left as they are.
+    void set(size_t slot, uint32_t cluster, size_t top) {
       float* leaf = block(0, slot / 8);
       const size_t features = core_.k();
-      for (size_t f = 0; f < features; ++f)
-        leaf[8 * f + slot % 8] = cluster == kNone ? kInfinity : core_.of(cluster)[f];
+      for (size_t f = 0; f < features; ++f) leaf[8 * f + slot % 8] = cluster == kNone ? kInfinity : core_.of(cluster)[f];
       ids(leaf)[slot % 8] = cluster == kNone ? kNone : core_.least_[cluster];
       size_t at = slot / 8;
-      for (size_t l = 1; l < levels_; ++l, at /= 8)
+      for (size_t l = 1; l <= top; ++l, at /= 8)
         if (!summarize(block(l - 1, at), block(l, at / 8), at % 8)) break;
     }
 
     // The best match of the cluster in `slot`, where it is better than `best`; else `best` as it is.
-    // Starts at the cluster's own leaf and climbs; at each level looks down into the siblings that may hold a better
-    // one.
-    Match find(uint32_t cluster, size_t slot, Match best) const {
-      const Lanes8 d;
-      const auto query = core_.policy_.query(d, core_.of(cluster));
-      Pending stack[8 * kMaxLevels];
+    // Starts at the cluster's own leaf and climbs; at each level looks down into the siblings that may hold a better one.
+    // Up to level `top` in this tree, further up in `outside`.
+    Match find(uint32_t cluster, size_t slot, Match best, size_t top, const BestMatchTree* outside) const {
+      const auto query = core_.policy_.query(Lanes8(), core_.of(cluster));
       visit_leaf(query, slot / 8, 1u << (slot % 8), best);
-      size_t at = slot / 8;
-      for (size_t l = 1; l < levels_; ++l, at /= 8) {
-        size_t top = visit_inner(query, l, at / 8, 1u << (at % 8), best, stack, 0);
-        while (top > 0) {
-          const Pending& next = stack[--top];
-          if (!(next.cost < best.cost || (next.cost == best.cost && next.least < best.least))) continue;
-          if (next.level == 0)
-            visit_leaf(query, next.block, 0, best);
-          else
-            top = visit_inner(query, next.level, next.block, 0, best, stack, top);
-        }
-      }
+      climb(query, slot / 8, 1, top, best);
+      if (outside != nullptr) outside->climb(query, (slot / 8) >> (3 * top), top + 1, levels_ - 1, best);
       return best;
     }
 
@@ -326,6 +352,13 @@ class Core {
     const float* block(size_t level, size_t i) const { return data_.get() + (start_[level] + i) * stride_; }
     uint32_t* ids(float* b) const { return reinterpret_cast<uint32_t*>(b + stride_ - 8); }
     const uint32_t* ids(const float* b) const { return reinterpret_cast<const uint32_t*>(b + stride_ - 8); }
+
+    void reserve() {
+      if (used_ <= capacity_) return;
+      capacity_ = used_;
+      data_ = hwy::AllocateAligned<float>(capacity_);
+      if (!data_) throw Error(ErrorCode::out_of_memory, "agglomerate: no memory for the search tree");
+    }
 
     // Sums `child` up in `lane` of `parent`. True when that changed anything.
     bool summarize(const float* child, float* parent, size_t lane) {
@@ -345,6 +378,22 @@ class Core {
       changed |= ids(parent)[lane] != id;
       ids(parent)[lane] = id;
       return changed;
+    }
+
+    template <class Query>
+    HWY_INLINE void climb(const Query& query, size_t at, size_t from, size_t top, Match& best) const {
+      Pending stack[8 * kMaxLevels];
+      for (size_t l = from; l <= top; ++l, at /= 8) {
+        size_t pending = visit_inner(query, l, at / 8, 1u << (at % 8), best, stack, 0);
+        while (pending > 0) {
+          const Pending next = stack[--pending];
+          if (!(next.cost < best.cost || (next.cost == best.cost && next.least < best.least))) continue;
+          if (next.level == 0)
+            visit_leaf(query, next.block, 0, best);
+          else
+            pending = visit_inner(query, next.level, next.block, 0, best, stack, pending);
+        }
+      }
     }
 
     // Costs of all lanes, and the lanes that are as good as `best` or better.
@@ -386,9 +435,7 @@ class Core {
         if (costs[lane] == best.cost && least >= best.least) continue;
         const Pending p{costs[lane], least, static_cast<uint32_t>(level - 1), static_cast<uint32_t>(8 * at) + lane};
         size_t i = top++;
-        for (; i > bottom &&
-               (stack[i - 1].cost < p.cost || (stack[i - 1].cost == p.cost && stack[i - 1].least < p.least));
-             --i)
+        for (; i > bottom && (stack[i - 1].cost < p.cost || (stack[i - 1].cost == p.cost && stack[i - 1].least < p.least)); --i)
           stack[i] = stack[i - 1];
         stack[i] = p;
       }
@@ -397,7 +444,7 @@ class Core {
 
     static constexpr size_t kMaxLevels = 12;  // 8^11 slots
     const Core& core_;
-    size_t stride_, size_ = 0, levels_ = 0, capacity_ = 0;
+    size_t stride_, size_ = 0, levels_ = 0, used_ = 0, capacity_ = 0;
     size_t start_[kMaxLevels] = {}, count_[kMaxLevels] = {};
     hwy::AlignedFreeUniquePtr<float[]> data_;
   };
@@ -416,8 +463,7 @@ class Core {
           if (cost < best || (cost == best && (lo < best_lo || (lo == best_lo && hi < best_hi))))
             best = cost, best_lo = lo, best_hi = hi, left = i, right = j;
         }
-      join(active[left], active[right], next_, best);
-      active[left] = next_++;
+      join(active[left], active[right], best);
       active.erase(active.begin() + static_cast<ptrdiff_t>(right));
     }
   }
@@ -427,13 +473,13 @@ class Core {
     struct Pair {
       float cost;
       uint32_t lo, hi;  // least leaves
-      uint32_t owner, other;
+      uint32_t owner, other, owner_node, other_node;
       bool operator<(const Pair& o) const {  // of std::priority_queue: the least on top
         return cost != o.cost ? cost > o.cost : (lo != o.lo ? lo > o.lo : hi > o.hi);
       }
     };
     BestMatchTree tree(*this);
-    std::vector<uint32_t> slot_of(2 * n_, kNone), in_slot;
+    std::vector<uint32_t> slot_of(n_, kNone), in_slot;
     const auto rebuild = [&] {
       sort_in_space(active);
       tree.build(active);
@@ -444,10 +490,10 @@ class Core {
     size_t alive = active.size(), next_rebuild = alive / 2;
     std::priority_queue<Pair> queue;
     const auto push = [&](uint32_t cluster) {
-      const Match match = tree.find(cluster, slot_of[cluster], {});
+      const Match match = tree.find(cluster, slot_of[cluster], {}, tree.levels() - 1, nullptr);
       const uint32_t other = in_slot[match.slot];
       const auto [lo, hi] = std::minmax({least_[cluster], least_[other]});
-      queue.push({match.cost, lo, hi, cluster, other});
+      queue.push({match.cost, lo, hi, cluster, other, node_[cluster], node_[other]});
     };
     for (size_t i = 0; i < active.size(); ++i) {
       if ((i & 0xfff) == 0) check();
@@ -456,19 +502,17 @@ class Core {
     while (alive > 1) {
       const Pair pair = queue.top();
       queue.pop();
-      if (slot_of[pair.owner] == kNone) continue;
-      if (slot_of[pair.other] == kNone) {
+      if (slot_of[pair.owner] == kNone || node_[pair.owner] != pair.owner_node) continue;
+      if (slot_of[pair.other] == kNone || node_[pair.other] != pair.other_node) {
         push(pair.owner);
         continue;
       }
-      if ((next_ & 0xfff) == 0) check();
-      const uint32_t slot_a = slot_of[pair.owner], slot_b = slot_of[pair.other], c = next_++;
-      join(pair.owner, pair.other, c, pair.cost);
-      slot_of[pair.owner] = slot_of[pair.other] = kNone;
-      in_slot[slot_a] = c, in_slot[slot_b] = kNone;
-      slot_of[c] = slot_a;
-      tree.set(slot_b, kNone);
-      tree.set(slot_a, c);
+      if ((merges_.size() & 0xfff) == 0) check();
+      join(pair.owner, pair.other, pair.cost);
+      const uint32_t slot = slot_of[pair.other];
+      slot_of[pair.other] = kNone, in_slot[slot] = kNone;
+      tree.set(slot, kNone, tree.levels() - 1);
+      tree.set(slot_of[pair.owner], pair.owner, tree.levels() - 1);
       if (--alive <= next_rebuild && alive > 64) {
         active.clear();
         for (const uint32_t cluster : in_slot)
@@ -476,162 +520,130 @@ class Core {
         rebuild();
         next_rebuild = alive / 2;
       }
-      if (alive > 1) push(c);
+      if (alive > 1) push(pair.owner);
     }
   }
 
-  // Fig. 4, with the chain kept as a stack: what lies below the top stays a chain of best matches when the top merges.
-  void chain(std::vector<uint32_t> active) {
-    BestMatchTree tree(*this);
-    std::vector<uint32_t> slot_of(2 * n_, kNone), in_slot;
+  // Fig. 4 over the slots [begin, end), which the block of level `top` over them spans, with the chain kept as a stack: what lies
+  // below the top stays a chain of best matches when the top merges. Stops when `stop_at` clusters are left.
+  // Where a cluster's best match lies outside (in `outside`, a copy of the tree from before), the chain ends there and its
+  // clusters rest: clusters outside only grow, so by Eq. 1 whatever merges inside is right whatever happens outside.
+  void chain_within(BestMatchTree& tree, const BestMatchTree* outside, size_t top, size_t begin, size_t end, size_t stop_at,
+                    uint32_t first_id, std::vector<uint32_t>& in_slot, std::vector<Merge>& merges) {
     struct Link {
-      uint32_t cluster;
-      Match match;  // the link before: a better match must beat it
+      uint32_t slot;
+      Match match;  // the link before: what a better match must beat
     };
     std::vector<Link> links;
-    size_t alive = active.size(), next_rebuild = 0, scan = 0;
-    const auto rebuild = [&] {
-      sort_in_space(active);
-      tree.build(active);
-      in_slot = active;
-      for (size_t i = 0; i < active.size(); ++i) slot_of[active[i]] = static_cast<uint32_t>(i);
-      for (size_t i = 1; i < links.size(); ++i) links[i].match.slot = slot_of[links[i - 1].cluster];
-      next_rebuild = alive > 64 ? alive / 2 : 0;
-      scan = 0;
-    };
-    rebuild();
-    while (alive > 1) {
-      if (alive <= next_rebuild) {
-        active.clear();
-        for (const uint32_t cluster : in_slot)
-          if (cluster != kNone) active.push_back(cluster);
-        rebuild();
-      }
+    std::vector<uint8_t> resting(outside != nullptr ? end - begin : 0, 0);
+    const auto rests = [&](size_t slot) { return outside != nullptr && resting[slot - begin] != 0; };
+    size_t alive = end - begin, scan = begin;
+    while (alive > stop_at) {
       if (links.empty()) {
-        while (in_slot[scan] == kNone) ++scan;
-        links.push_back({in_slot[scan], {}});
+        while (scan < end && (in_slot[scan] == kNone || rests(scan))) ++scan;
+        if (scan == end) return;
+        links.push_back({static_cast<uint32_t>(scan), {}});
       }
-      const Link top = links.back();
-      const Match match = tree.find(top.cluster, slot_of[top.cluster], top.match);
-      if (match.slot != top.match.slot) {
-        links.push_back({in_slot[match.slot], {match.cost, least_[top.cluster], slot_of[top.cluster]}});
+      const Link last = links.back();
+      const uint32_t cluster = in_slot[last.slot];
+      const Match match = tree.find(cluster, last.slot, last.match, top, outside);
+      if (match.slot != last.match.slot) {
+        if (match.slot < begin || match.slot >= end || rests(match.slot)) {
+          for (const Link& link : links) resting[link.slot - begin] = 1;
+          links.clear();
+          continue;
+        }
+        links.push_back({match.slot, {match.cost, least_[cluster], last.slot}});
         continue;
       }
-      if ((next_ & 0xfff) == 0) check();
-      const uint32_t other = links[links.size() - 2].cluster, c = next_++;
-      const uint32_t slot_a = slot_of[top.cluster], slot_b = slot_of[other];
+      if (match.slot == kNone) return;  // alone
+      if ((merges.size() & 0x3ff) == 0) check();
+      const uint32_t into = match.slot;
       links.resize(links.size() - 2);
-      join(top.cluster, other, c, match.cost);
-      in_slot[slot_b] = c, in_slot[slot_a] = kNone;
-      slot_of[c] = slot_b;
-      tree.set(slot_a, kNone);
-      tree.set(slot_b, c);
-      scan = std::min<size_t>(scan, slot_b);
+      merges.push_back(join(in_slot[into], cluster, match.cost, first_id + static_cast<uint32_t>(merges.size())));
+      in_slot[last.slot] = kNone;
+      tree.set(last.slot, kNone, top);
+      tree.set(into, in_slot[into], top);
+      scan = std::min<size_t>(scan, into);
       --alive;
     }
   }
 
-  // In each round every cluster knows its best match, and all pairs that agree merge at once: by Eq. 1 greed would
-  // merge them too, sooner or later. What is computed depends on nothing but the clusters: the same tree on any number
-  // of threads.
-  void rounds(std::vector<uint32_t> active) {
-    constexpr size_t kChunk = 256;
+  static void keep_alive(const std::vector<uint32_t>& in_slot, std::vector<uint32_t>& active) {
+    active.clear();
+    for (const uint32_t cluster : in_slot)
+      if (cluster != kNone) active.push_back(cluster);
+  }
+
+  // Fig. 4. The tree is built anew whenever half of the clusters are gone.
+  void chain(std::vector<uint32_t> active) {
     BestMatchTree tree(*this);
-    sort_in_space(active);
-    size_t sorted = active.size();
-    std::vector<Match> match(active.size()), new_match;  // slot kNone: to be sought, and `cost`, `least` bound it
-    std::vector<uint32_t> new_active, new_slot, first_new, first_out;
+    std::vector<uint32_t> in_slot;
     while (active.size() > 1) {
-      check();
-      const size_t m = active.size();
+      sort_in_space(active);
       tree.build(active);
-      for_chunks(m, kChunk, [&](size_t begin, size_t end) {
-        for (size_t i = begin; i < end; ++i)
-          if (match[i].least == kNone || match[i].slot == kNone) match[i] = tree.find(active[i], i, {});
-      });
-      // Where each chunk's clusters and merges will be written.
-      const size_t chunks = (m + kChunk - 1) / kChunk;
-      const auto is_first = [&](size_t i) { return match[i].slot > i && match[match[i].slot].slot == i; };
-      const auto is_second = [&](size_t i) { return match[i].slot < i && match[match[i].slot].slot == i; };
-      first_new.assign(chunks + 1, 0);
-      first_out.assign(chunks + 1, 0);
-      for_chunks(m, kChunk, [&](size_t begin, size_t end) {
-        uint32_t merged = 0, kept = 0;
-        for (size_t i = begin; i < end; ++i) merged += is_first(i), kept += !is_second(i);
-        first_new[begin / kChunk + 1] = merged, first_out[begin / kChunk + 1] = kept;
-      });
-      for (size_t c = 0; c < chunks; ++c) first_new[c + 1] += first_new[c], first_out[c + 1] += first_out[c];
-      const uint32_t merged = first_new[chunks];
-      // Long chains of ever better matches merge one pair a round: those are work for the serial chain.
-      if (m <= 64 || merged < m / 64) {
-        chain(std::move(active));
-        return;
-      }
-      new_active.resize(first_out[chunks]);
-      new_slot.resize(m);
-      for_chunks(m, kChunk, [&](size_t begin, size_t end) {
-        uint32_t c = next_ + first_new[begin / kChunk], out = first_out[begin / kChunk];
-        for (size_t i = begin; i < end; ++i) {
-          if (is_second(i)) continue;
-          new_slot[i] = out;
-          if (is_first(i)) {
-            join(active[i], active[match[i].slot], c, match[i].cost);
-            new_active[out] = c++;
-          } else {
-            new_active[out] = active[i];
-          }
-          ++out;
-        }
-      });
-      next_ += merged;
-      new_match.assign(new_active.size(), {});
-      for_chunks(m, kChunk, [&](size_t begin, size_t end) {
-        for (size_t i = begin; i < end; ++i) {
-          if (is_second(i) || is_first(i)) continue;
-          const size_t j = match[i].slot;
-          const bool gone = is_first(j) || is_second(j);
-          if (!gone) new_match[new_slot[i]] = {match[i].cost, match[i].least, new_slot[j]};
-        }
-      });
-      active.swap(new_active);
-      match.swap(new_match);
-      if (active.size() <= sorted / 2) {
-        resort(active, match);
-        sorted = active.size();
-      }
+      in_slot = active;
+      const size_t stop_at = active.size() > 64 ? active.size() / 2 : 1;
+      chain_within(tree, nullptr, tree.levels() - 1, 0, active.size(), stop_at, static_cast<uint32_t>(n_), in_slot, merges_);
+      keep_alive(in_slot, active);
     }
   }
 
-  // Puts the clusters in order anew, their matches with them.
-  void resort(std::vector<uint32_t>& active, std::vector<Match>& match) {
-    std::vector<uint32_t> before = active, slot_of_cluster(next_, kNone);
-    std::vector<Match> moved(match.size());
-    sort_in_space(active);
-    for (uint32_t i = 0; i < active.size(); ++i) slot_of_cluster[active[i]] = i;
-    for (size_t i = 0; i < before.size(); ++i) {
-      Match m = match[i];
-      if (m.slot != kNone) m.slot = slot_of_cluster[before[m.slot]];
-      moved[slot_of_cluster[before[i]]] = m;
+  // Chains run at once in regions: subtrees of the search tree, whose size depends on the number of clusters alone. When all
+  // have come to rest, what is left is put in new regions. So the tree is the same on any number of threads.
+  void regions(std::vector<uint32_t> active) {
+    BestMatchTree tree(*this), before(*this);
+    std::vector<uint32_t> in_slot;
+    std::vector<std::vector<Merge>> merges;
+    for (;;) {
+      const size_t m = active.size(), top = m > (1u << 21) ? 4 : (m > (1u << 16) ? 3 : 2), span = size_t{1} << (3 * (top + 1));
+      if (m < 4 * span) return chain(std::move(active));
+      sort_in_space(active);
+      tree.build(active);
+      before.copy(tree);
+      in_slot = active;
+      const size_t count = (m + span - 1) / span;
+      const auto first_id = static_cast<uint32_t>(n_ + merges_.size());
+      merges.assign(count, {});
+      for_chunks(count, 1, [&](size_t region, size_t) {
+        const size_t begin = region * span, end = std::min(m, begin + span);
+        chain_within(tree, &before, top, begin, end, 1, first_id + static_cast<uint32_t>(begin), in_slot, merges[region]);
+      });
+      // Ids were given with gaps, since no region knows how many merges another has.
+      for (size_t region = 0; region < count; ++region) {
+        const auto gapped = first_id + static_cast<uint32_t>(region * span), shift = gapped - static_cast<uint32_t>(n_ + merges_.size());
+        for (Merge merge : merges[region]) {
+          if (merge.left >= first_id) merge.left -= shift;
+          if (merge.right >= first_id) merge.right -= shift;
+          merges_.push_back(merge);
+        }
+        for (size_t slot = region * span; slot < std::min(m, (region + 1) * span); ++slot)
+          if (in_slot[slot] != kNone && node_[in_slot[slot]] >= first_id) node_[in_slot[slot]] -= shift;
+      }
+      keep_alive(in_slot, active);
+      // Where regions hardly merge, one chain over all is as good.
+      if (active.size() > m - m / 8) return chain(std::move(active));
     }
-    match.swap(moved);
   }
 
   // Post-order from the root, the child with the smaller least leaf first.
   std::vector<Merge> canonical() const {
     std::vector<Merge> out(merges_.size());
     if (out.empty()) return out;
-    std::vector<uint32_t> id(merges_.size());
+    const auto n = static_cast<uint32_t>(n_);
+    std::vector<uint32_t> id(merges_.size()), least(merges_.size());
+    const auto least_of = [&](uint32_t node) { return node < n ? node : least[node - n]; };
+    for (size_t i = 0; i < merges_.size(); ++i) least[i] = std::min(least_of(merges_[i].left), least_of(merges_[i].right));
     struct Visit {
       uint32_t merge;
       bool done;
     };
-    std::vector<Visit> stack{{next_ - 1 - static_cast<uint32_t>(n_), false}};
+    std::vector<Visit> stack{{static_cast<uint32_t>(merges_.size() - 1), false}};
     uint32_t count = 0;
-    const auto n = static_cast<uint32_t>(n_);
     while (!stack.empty()) {
       const Visit v = stack.back();
       const Merge& m = merges_[v.merge];
-      const bool swap = least_[m.right] < least_[m.left];
+      const bool swap = least_of(m.right) < least_of(m.left);
       const uint32_t left = swap ? m.right : m.left, right = swap ? m.left : m.right;
       if (!v.done) {
         stack.back().done = true;
@@ -646,14 +658,12 @@ class Core {
     return out;
   }
 
-  static constexpr size_t kMaxFeatures = 64;
   const Policy& policy_;
   size_t n_;
-  uint32_t next_;
   bool threads_;
   Progress* progress_;
   hwy::AlignedFreeUniquePtr<float[]> features_;
-  std::vector<uint32_t> least_;
+  std::vector<uint32_t> least_, node_;
   std::vector<Merge> merges_;
 };
 

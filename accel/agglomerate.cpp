@@ -118,13 +118,15 @@ std::vector<Merge> boxes(std::span<const Aabb> input, float scale, float inflate
                          Progress* progress) {
   const AreaPolicy policy;
   agglomeration::Core<AreaPolicy> core(policy, input.size(), strategy == Strategy::parallel, progress);
-  for (size_t i = 0; i < input.size(); ++i) {
-    float* f = core.leaf(i);
-    for (int axis = 0; axis < 3; ++axis) {
-      f[axis] = -(input[i].lo[axis] * scale);
-      f[3 + axis] = input[i].hi[axis] * scale + inflate;
+  core.for_chunks(input.size(), 4096, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      float* f = core.leaf(i);
+      for (int axis = 0; axis < 3; ++axis) {
+        f[axis] = -(input[i].lo[axis] * scale);
+        f[3 + axis] = input[i].hi[axis] * scale + inflate;
+      }
     }
-  }
+  });
   return core.run(strategy);
 }
 
