@@ -1,0 +1,318 @@
+// Level 3: parameters that tell of themselves, lights in and out, and shading of a host's points.
+#include <cstring>
+#include <numbers>
+#include <set>
+#include <thread>
+
+#include "box_scene.h"
+
+namespace {
+
+using namespace box;
+constexpr double kPi = std::numbers::pi;
+
+TEST(Integrators, TellTheirParametersAndTakeTheirDefaults) {
+  const api::Device device(1);
+  std::set<std::string> ids;
+  auto info = make<lumicut_integrator_info>();
+  for (uint32_t n = 0; lumicut_get_integrator_info(n, &info) == LUMICUT_OK; ++n) {
+    SCOPED_TRACE(info.id);
+    EXPECT_TRUE(ids.insert(info.id).second);
+    EXPECT_STRNE(info.label, "");
+    EXPECT_STRNE(info.description, "");
+    api::Integrator i(device, info.id);
+    auto p = make<lumicut_param_info>();
+    uint32_t params = 0;
+    for (; lumicut_get_param_info(info.id, params, &p) == LUMICUT_OK; ++params) {
+      SCOPED_TRACE(p.id);
+      EXPECT_STRNE(p.label, "");
+      EXPECT_STRNE(p.description, "");
+      EXPECT_EQ(i.value(p.id), p.default_text);
+      i.set(p.id, p.default_text);
+      if (p.type == LUMICUT_FLOAT || p.type == LUMICUT_INT) {
+        const double v = std::stod(p.default_text);
+        EXPECT_GE(v, p.minimum);
+        EXPECT_LE(v, p.maximum);
+      } else if (p.type == LUMICUT_CHOICE) {
+        EXPECT_NE(std::string(p.choices).find(p.default_text), std::string::npos);
+      }
+    }
+    EXPECT_EQ(params, info.param_count);
+  }
+  EXPECT_EQ(ids.count("exhaustive"), 1u);
+  EXPECT_CODE(lumicut_get_param_info("no_such", 0, nullptr), LUMICUT_INVALID_ARGUMENT, "\"no_such\" is not known");
+  lumicut_integrator none = nullptr;
+  EXPECT_CODE(lumicut_integrator_create(device.get(), "no_such", &none), LUMICUT_INVALID_ARGUMENT, "exhaustive");
+}
+
+TEST(Integrators, LightsThatGoOutComeInAgainUnchanged) {
+  const api::Device device(2);
+  const api::Scene s = scene(device);
+  const api::Integrator first = integrator(device);
+  const auto image = render(first, s);
+  const auto lights = first.lights();
+  EXPECT_GT(lights.size(), 300u);
+  api::Integrator second = integrator(device, 7);
+  second.set_lights(lights);
+  EXPECT_EQ(render(second, s), image);
+  const auto again = second.lights();
+  ASSERT_EQ(again.size(), lights.size());
+  EXPECT_EQ(std::memcmp(again.data(), lights.data(), lights.size() * sizeof(lumicut_vpl)), 0);
+  second.set_lights({});
+  second.set("vpls", "400");
+  EXPECT_EQ(render(second, s), image) << "traced again";
+}
+
+TEST(Integrators, HostLightsAreCheckedByNameAndValue) {
+  const api::Device device(1);
+  const api::Integrator i(device, "exhaustive");
+  lumicut_vpl good{};
+  good.kind = LUMICUT_VPL_ORIENTED;
+  good.normal[2] = 1;
+  good.intensity[0] = 1;
+  const auto refused = [&](auto spoil, lumicut_result code, const char* text) {
+    std::vector<lumicut_vpl> lights(3, good);
+    spoil(lights[2]);
+    EXPECT_CODE(lumicut_integrator_set_lights(i.get(), lights.data(), lights.size()), code, text);
+  };
+  refused([](auto& l) { l.kind = 4; }, LUMICUT_INVALID_ARGUMENT, "lumicut_vpl[2].kind: 4 is not in [0, 3]");
+  refused([](auto& l) { l.position[1] = NAN; }, LUMICUT_INVALID_ARGUMENT, "lumicut_vpl[2].position[1]: nan");
+  refused([](auto& l) { l.normal[2] = 0; }, LUMICUT_INVALID_ARGUMENT, "lumicut_vpl[2].normal: has length 0, not 1");
+  refused([](auto& l) { l.intensity[2] = -1; }, LUMICUT_INVALID_ARGUMENT, "lumicut_vpl[2].intensity[2]: -1");
+  refused([](auto& l) { l.intensity[2] = INFINITY; }, LUMICUT_INVALID_ARGUMENT, "lumicut_vpl[2].intensity[2]: inf");
+  refused([](auto& l) { l.kind = LUMICUT_VPL_SPOT, l.cos_outer = 2; }, LUMICUT_INVALID_ARGUMENT,
+          "lumicut_vpl[2].cos_outer: 2");
+  refused([](auto& l) { l.reserved = 1; }, LUMICUT_UNSUPPORTED, "lumicut_vpl[2].reserved: 1");
+  EXPECT_CODE(lumicut_integrator_set_lights(i.get(), nullptr, 2), LUMICUT_INVALID_ARGUMENT, "count is 2");
+}
+
+TEST(Integrators, AMillionHostLightsAreTaken) {
+  const api::Device device(2);
+  const api::Scene s = scene(device);
+  api::Integrator i(device, "exhaustive");
+  std::vector<lumicut_vpl> lights(1000000);
+  for (auto& l : lights) l.position[1] = 0.9f, l.position[2] = -1, l.intensity[0] = 1e-6f;
+  i.set_lights(lights);
+  i.prepare(s);
+  EXPECT_EQ(i.lights().size(), lights.size());
+}
+
+// One point of a floor at the origin, seen from above.
+struct Floor {
+  explicit Floor(const api::Device& device) : scene(device) {
+    auto m = make<lumicut_material>();
+    m.diffuse[0] = m.diffuse[1] = m.diffuse[2] = 0.5f;
+    scene.set_materials({m});
+    mesh.quad({{{-1, 0, 1}, {1, 0, 1}, {1, 0, -1}, {-1, 0, -1}}}, 0);
+    scene.add_mesh(mesh.mesh());
+  }
+  static lumicut_point point(float x = 0) {
+    lumicut_point p{};
+    p.position[0] = x;
+    p.normal[1] = p.geometric_normal[1] = p.to_viewer[1] = 1;
+    return p;
+  }
+  // Direct light of one lamp: nothing bounces.
+  double radiance(const api::Device& device, const lumicut_light& light, const lumicut_point& p = point()) {
+    scene.set_lights({light});
+    scene.commit();
+    api::Integrator i(device, "exhaustive");
+    i.set("max_depth", "0").set("vpls", "20000").set("clamp_relative", "0");
+    i.prepare(scene);
+    return i.shade({p})[0];
+  }
+  Geometry mesh;
+  api::Scene scene;
+};
+
+lumicut_light above(uint32_t type, float height, float watt) {
+  auto l = make<lumicut_light>();
+  l.type = type, l.unit = LUMICUT_WATT, l.value = watt;
+  l.color[0] = l.color[1] = l.color[2] = 1;
+  l.position[1] = height;
+  l.direction[1] = -1;
+  return l;
+}
+
+constexpr double kBrdf = 0.5 / kPi;
+// Single precision, and points that stand off the floor by a 1e-4 of the distance or less.
+constexpr double kExact = 1e-3;
+
+TEST(Units, PointLampsOfPWattShineWithPOver4PiPerSteradian) {
+  const api::Device device(1);
+  Floor f(device);
+  const double expected = kBrdf * 30 / (4 * kPi) / 4;
+  EXPECT_NEAR(f.radiance(device, above(LUMICUT_POINT, 2, 30)), expected, kExact * expected);
+  auto l = above(LUMICUT_POINT, 2, 30);
+  l.unit = LUMICUT_RADIOMETRIC;
+  EXPECT_NEAR(f.radiance(device, l), kBrdf * 30 / 4, kExact * kBrdf * 30 / 4);
+}
+
+TEST(Units, SpotsShineAsPointLampsTimesTheirProfile) {
+  const api::Device device(1);
+  Floor f(device);
+  auto l = above(LUMICUT_SPOT, 2, 30);
+  l.angle = 1.2f;
+  const double on_axis = kBrdf * 30 / (4 * kPi) / 4;
+  EXPECT_NEAR(f.radiance(device, l), on_axis, kExact * on_axis);
+  // At x the cosine is 2/√(4+x²); inside a soft edge smoothstep((c − cos h)/((1 − cos h)·blend)).
+  l.blend = 0.7f;
+  for (const bool cosine : {false, true}) {
+    l.spot_cosine = cosine;
+    for (const float x : {0.2f, 0.6f, 0.9f, 1.3f, 1.4f}) {
+      const double d2 = 4 + double{x} * x, c = 2 / std::sqrt(d2), h = std::cos(0.6);
+      const double t = std::clamp((c - h) / ((1 - h) * 0.7), 0.0, 1.0);
+      const double expected = kBrdf * 30 / (4 * kPi) * t * t * (3 - 2 * t) * (cosine ? c : 1.0) * c / d2;
+      EXPECT_NEAR(f.radiance(device, l, Floor::point(x)), expected, kExact * on_axis) << x;
+    }
+  }
+}
+
+TEST(Units, SunsGiveTheirValueAsIrradianceInBothUnits) {
+  const api::Device device(1);
+  Floor f(device);
+  auto l = above(LUMICUT_SUN, 0, 3);
+  EXPECT_NEAR(f.radiance(device, l), kBrdf * 3, kExact * kBrdf * 3);
+  l.unit = LUMICUT_RADIOMETRIC;
+  EXPECT_NEAR(f.radiance(device, l), kBrdf * 3, kExact * kBrdf * 3);
+  l.direction[0] = 1;  // 45 degrees, not normalised
+  EXPECT_NEAR(f.radiance(device, l), kBrdf * 3 * std::sqrt(0.5), kExact * kBrdf * 3);
+}
+
+TEST(Units, AreaLampsOfPWattHaveRadiancePOver4Area) {
+  const api::Device device(1);
+  Floor f(device);
+  for (const uint32_t type : {uint32_t{LUMICUT_RECTANGLE}, uint32_t{LUMICUT_DISK}}) {
+    auto l = above(type, 5, 80);
+    l.u[0] = 0.2f, l.v[2] = 0.1f;
+    // Far away a lamp of radiance P/(4A) and area A shines with P/4, whatever its shape. 0.2 % for its size at
+    // distance 5.
+    const double expected = kBrdf * 80 / 4 / 25;
+    EXPECT_NEAR(f.radiance(device, l), expected, 2e-3 * expected);
+    // Scaled with its object in the world, the lamp keeps its power.
+    l.u[0] = 0.02f;
+    EXPECT_NEAR(f.radiance(device, l), expected, 2e-3 * expected);
+    l.unit = LUMICUT_RADIOMETRIC, l.value = 7;
+    const double area = 0.02 * 0.1 * (type == LUMICUT_DISK ? kPi / 4 : 1.0);
+    EXPECT_NEAR(f.radiance(device, l), kBrdf * 7 * area / 25, 2e-3 * kBrdf * 7 * area / 25);
+  }
+}
+
+TEST(Units, SpreadNarrowsAreaLampsAndKeepsTheirFlux) {
+  const api::Device device(1);
+  Floor f(device);
+  auto l = above(LUMICUT_RECTANGLE, 5, 80);
+  l.u[0] = 0.02f, l.v[2] = 0.02f;
+  l.spread = 1.5f;
+  const double a = (kPi - 1.5) / 2, n = 2 / (2 + (2 * a - kPi) * std::tan(a));
+  for (const float x : {0.0f, 2.0f, 4.0f, 6.0f}) {
+    const double d2 = 25 + double{x} * x, c = 5 / std::sqrt(d2), tangent = x / 5;
+    const double expected = kBrdf * 80 / 4 * n * std::max(0.0, 1 - tangent * std::tan(a)) * c * c / d2;
+    EXPECT_NEAR(f.radiance(device, l, Floor::point(x)), expected, 2e-3 * kBrdf * 80 / 4 / 25 * n) << x;
+  }
+}
+
+std::vector<lumicut_point> room_points(size_t n) {
+  std::vector<lumicut_point> points(n);
+  for (size_t i = 0; i < n; ++i) {
+    auto& p = points[i];
+    p = {};
+    p.position[0] = -0.9f + 1.8f * static_cast<float>(i % 97) / 97;
+    p.position[1] = -1;
+    p.position[2] = -0.1f - 1.8f * static_cast<float>(i / 97 % 89) / 89;
+    p.normal[1] = p.geometric_normal[1] = 1;
+    p.to_viewer[1] = 0.6f, p.to_viewer[2] = 0.8f;
+    p.material = i % 5 == 0 ? 3 : 0;
+    p.pixel = static_cast<uint32_t>(i / 3);
+  }
+  return points;
+}
+
+TEST(Shade, ManyThreadsAtOnceGetWhatOneGets) {
+  const api::Device device(2);
+  const api::Scene s = scene(device);
+  for (const std::string& id : integrator_ids()) {
+    SCOPED_TRACE(id);
+    api::Integrator i = integrator(device, 150, id.c_str());
+    i.prepare(s);
+    const auto points = room_points(9000);
+    const auto expected = i.shade(points);
+    EXPECT_GT(mean(expected), 0);
+    std::vector<std::vector<float>> got(6);
+    std::vector<std::thread> threads;
+    for (auto& g : got) threads.emplace_back([&] { g = i.shade(points); });
+    for (auto& t : threads) t.join();
+    for (const auto& g : got) EXPECT_EQ(g, expected);
+  }
+}
+
+TEST(Shade, RefusesPointsThatCannotBe) {
+  const api::Device device(2);
+  const api::Scene s = scene(device);
+  api::Integrator i = integrator(device, 20);
+  float radiance[9] = {5, 5, 5, 5, 5, 5, 5, 5, 5};
+  EXPECT_CODE(lumicut_integrator_shade(i.get(), room_points(3).data(), 3, radiance), LUMICUT_INVALID_STATE,
+              "not prepared");
+  i.prepare(s);
+  const auto refused = [&](auto spoil, const char* text) {
+    auto points = room_points(3);
+    spoil(points[1]);
+    EXPECT_CODE(lumicut_integrator_shade(i.get(), points.data(), 3, radiance), LUMICUT_INVALID_ARGUMENT, text);
+    for (const float r : radiance) EXPECT_EQ(r, 5);
+  };
+  refused([](auto& p) { p.position[2] = NAN; }, "lumicut_point[1].position[2]: nan");
+  refused([](auto& p) { p.normal[1] = 2; }, "lumicut_point[1].normal: has length 2, not 1");
+  refused([](auto& p) { p.geometric_normal[0] = INFINITY; }, "lumicut_point[1].geometric_normal[0]: inf");
+  refused([](auto& p) { p.to_viewer[1] = p.to_viewer[2] = 0; }, "lumicut_point[1].to_viewer");
+  refused([](auto& p) { p.u = NAN; }, "lumicut_point[1].u: nan");
+  refused([](auto& p) { p.material = 4; }, "lumicut_point[1].material: 4 is out of range: the scene has 4 materials");
+  EXPECT_EQ(lumicut_integrator_shade(i.get(), nullptr, 0, nullptr), LUMICUT_OK);
+}
+
+TEST(Shade, ASceneThatChangedAsksForANewPreparation) {
+  const api::Device device(2);
+  api::Scene s = scene(device);
+  api::Integrator i = integrator(device, 50);
+  i.prepare(s);
+  const auto points = room_points(10);
+  const auto before = i.shade(points);
+  s.set_lights({});
+  EXPECT_THROW(i.shade(points), api::Exception);
+  s.commit();
+  float radiance[30];
+  EXPECT_CODE(lumicut_integrator_shade(i.get(), points.data(), 10, radiance), LUMICUT_INVALID_STATE,
+              "was changed since");
+  i.prepare(s);
+  EXPECT_EQ(mean(i.shade(points)), 0);
+  s.set_lights({lamp()});
+  s.commit();
+  i.prepare(s);
+  EXPECT_EQ(i.shade(points), before);
+}
+
+TEST(Prepare, IsDoneOnceUntilSomethingChanges) {
+  const api::Device device(2);
+  api::Scene s = scene(device);
+  api::Integrator i = integrator(device, 100);
+  const auto reused = [&] {
+    i.prepare(s);
+    return i.stats_json().find("prepare_reused") != std::string::npos;
+  };
+  EXPECT_FALSE(reused());
+  EXPECT_TRUE(reused());
+  i.set("seed", "5");
+  EXPECT_FALSE(reused());
+  i.set("seed", "5");
+  EXPECT_TRUE(reused());
+  s.set_lights({lamp()});
+  s.commit();
+  EXPECT_FALSE(reused());
+  i.set_lights(i.lights());
+  EXPECT_FALSE(reused());
+  EXPECT_TRUE(reused());
+  const api::Scene other = scene(device);
+  i.prepare(other);
+  EXPECT_EQ(i.stats_json().find("prepare_reused"), std::string::npos);
+}
+
+}  // namespace

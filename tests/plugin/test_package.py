@@ -1,0 +1,144 @@
+"""The library as a package: its header under every compiler mode, what it exports, and what it installs."""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(os.environ.get("LUMICUT_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
+BUILD = pathlib.Path(os.environ.get("LUMICUT_BINARY_DIR", ROOT / "build/release"))
+CC, CXX = os.environ.get("CC", "cc"), os.environ.get("CXX", "c++")
+CMAKE = os.environ.get("LUMICUT_CMAKE", "cmake")
+SANITIZE = os.environ.get("LUMICUT_SANITIZE", "")
+INCLUDE = ROOT / "plugin/include"
+HEADER = INCLUDE / "lumicut/lumicut.h"
+LIBRARY = BUILD / "lib/liblumicut.so"
+
+
+def run(*command, **options):
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, **options)
+    if done.returncode != 0:
+        raise AssertionError(f"{' '.join(map(str, command))}\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def declared_functions():
+    return set(re.findall(r"LUMICUT_API [^;]*?\b(lumicut_\w+)\(", HEADER.read_text()))
+
+
+class Header(unittest.TestCase):
+    WARNINGS = ["-Wall", "-Wextra", "-Wpadded", "-pedantic", "-pedantic-errors", "-Werror", "-fsyntax-only"]
+
+    def compile(self, compiler, standard, language, header, warnings):
+        run(compiler, "-x", language, f"-std={standard}", *warnings, f"-I{INCLUDE}", "-",
+            input=f"#include <lumicut/{header}>\nint use(void);\nint use(void) {{ return LUMICUT_ABI_MAJOR; }}\n")
+
+    def test_c_header_compiles_clean_and_without_padding_in_every_standard(self):
+        for standard in ("c99", "c11", "c17", "gnu99"):
+            with self.subTest(standard):
+                self.compile(CC, standard, "c", "lumicut.h", [*self.WARNINGS, "-Wstrict-prototypes", "-Wc++-compat"])
+        for standard in ("c++17", "c++20"):
+            with self.subTest(standard):
+                self.compile(CXX, standard, "c++", "lumicut.h", self.WARNINGS)
+
+    def test_cxx_wrapper_compiles_clean_in_every_standard(self):
+        for standard in ("c++17", "c++20"):
+            with self.subTest(standard):
+                self.compile(CXX, standard, "c++", "lumicut.hpp", [w for w in self.WARNINGS if w != "-Wpadded"])
+
+    def test_c_header_includes_stdint_alone(self):
+        self.assertEqual(re.findall(r"#include\s+(\S+)", HEADER.read_text()), ["<stdint.h>"])
+
+
+class Exports(unittest.TestCase):
+    def test_the_library_exports_what_the_header_declares_and_nothing_else(self):
+        script = (ROOT / "plugin/lumicut.map").read_text()
+        self.assertEqual(set(re.findall(r"^\s+(lumicut_\w+);", script, re.M)), declared_functions())
+        exported = set()
+        for line in run("nm", "-D", "--defined-only", LIBRARY).splitlines():
+            name, _, version = line.split()[-1].partition("@@")
+            if name == "LUMICUT_1":  # the version itself
+                continue
+            exported.add(name)
+            self.assertEqual(version, "LUMICUT_1", name)
+        self.assertEqual(exported, declared_functions())
+
+    def test_the_soname_carries_the_abi_major(self):
+        self.assertIn("Library soname: [liblumicut.so.1]", run("readelf", "-d", LIBRARY))
+
+
+class CHost(unittest.TestCase):
+    def test_a_host_in_c99_renders_through_dlopen(self):
+        with tempfile.TemporaryDirectory() as folder:
+            out = pathlib.Path(folder) / "image"
+            text = run(BUILD / "bin/c_host", LIBRARY, out)
+            self.assertGreater(float(re.search(r"mean radiance (\S+)", text)[1]), 0.01)
+            self.assertEqual(out.with_suffix(".ppm").stat().st_size, len(b"P6\n96 64\n255\n") + 96 * 64 * 3)
+            self.assertEqual(out.with_suffix(".pfm").stat().st_size, len(b"PF\n96 64\n-1.0\n") + 96 * 64 * 12)
+
+    def test_a_library_that_is_not_there_is_told(self):
+        done = subprocess.run([BUILD / "bin/c_host", "/nowhere/liblumicut.so", "x"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("/nowhere/liblumicut.so", done.stderr)
+
+
+MAIN = """
+#include <lumicut/lumicut.hpp>
+#include <cstdio>
+int main() {
+  lumicut::api::Device device(1);
+  lumicut::api::Integrator integrator(device, "exhaustive");
+  std::printf("Lumicut %s, %s lights", lumicut_version(nullptr, nullptr), integrator.value("vpls").c_str());
+}
+"""
+PROJECT = """
+cmake_minimum_required(VERSION 3.22)
+project(host LANGUAGES CXX)
+find_package(lumicut 1.0 REQUIRED)
+add_executable(host main.cpp)
+target_compile_features(host PRIVATE cxx_std_17)
+target_link_libraries(host PRIVATE lumicut::lumicut)
+"""
+
+
+class Install(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        base = pathlib.Path(cls.folder.name)
+        run(CMAKE, "--install", BUILD, "--component", "plugin", "--prefix", base / "first")
+        cls.prefix = base / "moved"  # an installed tree may be moved
+        (base / "first").rename(cls.prefix)
+        cls.project = base / "host"
+        cls.project.mkdir()
+        (cls.project / "main.cpp").write_text(MAIN)
+        (cls.project / "CMakeLists.txt").write_text(PROJECT)
+        cls.flags = [f"-fsanitize={SANITIZE}"] if SANITIZE else []
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def test_a_project_finds_it_with_find_package(self):
+        build = self.project / "build"
+        run(CMAKE, "-S", self.project, "-B", build, f"-DCMAKE_PREFIX_PATH={self.prefix}", f"-DCMAKE_CXX_COMPILER={CXX}",
+            f"-DCMAKE_CXX_FLAGS={' '.join(self.flags)}")
+        run(CMAKE, "--build", build)
+        self.assertEqual(run(build / "host"), "Lumicut 1.0.0, 60000 lights")
+
+    @unittest.skipUnless(shutil.which("pkg-config"), "pkg-config is not installed")
+    def test_a_project_finds_it_with_pkg_config(self):
+        folder = next(self.prefix.rglob("lumicut.pc")).parent
+        environment = {**os.environ, "PKG_CONFIG_PATH": str(folder)}
+        flags = run("pkg-config", "--cflags", "--libs", "lumicut", env=environment).split()
+        self.assertEqual(run("pkg-config", "--modversion", "lumicut", env=environment).strip(), "1.0.0")
+        program = self.project / "with_pkg_config"
+        run(CXX, "-std=c++17", *self.flags, self.project / "main.cpp", "-o", program, *flags,
+            f"-Wl,-rpath,{next(self.prefix.rglob('liblumicut.so')).parent}")
+        self.assertEqual(run(program), "Lumicut 1.0.0, 60000 lights")
+
+
+if __name__ == "__main__":
+    unittest.main()

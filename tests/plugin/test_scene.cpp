@@ -1,0 +1,200 @@
+// Level 2: what a scene takes, keeps, and gives back after an error.
+#include "box_scene.h"
+
+namespace {
+
+using namespace box;
+
+TEST(Scene, UpdatedMeshesRenderAsIfTheyHadBeenAddedSo) {
+  const api::Device device(2);
+  const api::Integrator i = integrator(device);
+  api::Scene moved = scene(device);
+  const auto before = render(i, moved);
+  Geometry g = geometry();
+  for (size_t k = 0; k < g.positions.size(); k += 3) g.positions[k] *= 0.8f;
+  moved.update_mesh(0, g.positions.data(), nullptr, nullptr);
+  moved.commit();
+  const auto after = render(i, moved);
+  EXPECT_NE(after, before);
+
+  api::Scene fresh(device);
+  fresh.set_materials(materials());
+  fresh.add_mesh(g.mesh());
+  fresh.set_lights({lamp()});
+  fresh.set_camera(camera());
+  fresh.commit();
+  EXPECT_EQ(render(i, fresh), after);
+
+  moved.update_mesh(0, geometry().positions.data(), nullptr, nullptr);
+  moved.commit();
+  EXPECT_EQ(render(i, moved), before);
+}
+
+TEST(Scene, UpdatedTransformsMoveInstances) {
+  const api::Device device(2);
+  const Geometry g = geometry();
+  const float here[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, there[12] = {1, 0, 0, 0.2f, 0, 1, 0, 0, 0, 0, 1, 0};
+  const auto room = [&](const float* transform) {
+    api::Scene s(device);
+    s.set_materials(materials());
+    auto m = g.mesh();
+    m.transforms = transform, m.transform_count = 1;
+    s.add_mesh(m);
+    s.set_lights({lamp()});
+    s.set_camera(camera());
+    s.commit();
+    return s;
+  };
+  const api::Integrator i = integrator(device);
+  api::Scene s = room(there);
+  const auto moved = render(i, s);
+  s.update_mesh(0, nullptr, nullptr, here);
+  s.commit();
+  const auto back = render(i, s);
+  EXPECT_NE(back, moved);
+  EXPECT_EQ(back, render(i, room(here)));
+}
+
+TEST(Scene, AFailedCommitIsToldAndCanBeMended) {
+  const api::Device device(2);
+  const api::Integrator i = integrator(device);
+  api::Scene s = scene(device);
+  const auto good = render(i, s);
+
+  auto m = materials();
+  m[0].diffuse_texture = 3;  // there are none
+  s.set_materials(m);
+  EXPECT_CODE(lumicut_scene_commit(s.get()), LUMICUT_INVALID_ARGUMENT, "diffuse_texture");
+  auto f = frame();
+  lumicut_render r = nullptr;
+  EXPECT_CODE(lumicut_render_start(i.get(), s.get(), &f, &r), LUMICUT_INVALID_STATE, "changed since its last commit");
+  EXPECT_CODE(lumicut_integrator_prepare(i.get(), s.get()), LUMICUT_INVALID_STATE, "changed since its last commit");
+  EXPECT_EQ(s.status().state, LUMICUT_FAILED);
+
+  s.set_materials(materials());
+  s.commit();
+  EXPECT_EQ(s.status().state, LUMICUT_DONE);
+  EXPECT_EQ(render(i, s), good);
+}
+
+TEST(Scene, AMeshWhoseMaterialIsMissingFailsTheCommit) {
+  const api::Device device(1);
+  api::Scene s = scene(device, false);
+  s.set_materials({});
+  EXPECT_CODE(lumicut_scene_commit(s.get()), LUMICUT_INVALID_ARGUMENT, "material");
+}
+
+TEST(Scene, NeverCommittedScenesAndMissingCamerasAreToldApart) {
+  const api::Device device(1);
+  const api::Integrator i = integrator(device, 10);
+  api::Scene s(device);
+  auto f = frame();
+  lumicut_render r = nullptr;
+  EXPECT_CODE(lumicut_render_start(i.get(), s.get(), &f, &r), LUMICUT_INVALID_STATE, "never committed");
+  s.commit();
+  EXPECT_CODE(lumicut_render_start(i.get(), s.get(), &f, &r), LUMICUT_INVALID_STATE, "no camera");
+}
+
+TEST(Scene, ObjectsOfTwoDevicesDoNotMix) {
+  const api::Device one(1), other(1);
+  const api::Scene s = scene(one);
+  const api::Integrator i = integrator(other, 10);
+  auto f = frame();
+  lumicut_render r = nullptr;
+  EXPECT_CODE(lumicut_render_start(i.get(), s.get(), &f, &r), LUMICUT_INVALID_ARGUMENT, "another device");
+  EXPECT_CODE(lumicut_integrator_prepare(i.get(), s.get()), LUMICUT_INVALID_ARGUMENT, "another device");
+}
+
+TEST(Scene, WithoutGeometryTheEnvironmentIsSeen) {
+  const api::Device device(1);
+  api::Scene s(device);
+  auto e = make<lumicut_environment>();
+  e.color[0] = e.color[1] = e.color[2] = 0.5f;
+  s.set_environment(e);
+  s.set_camera(camera());
+  s.commit();
+  for (const float v : render(integrator(device, 10), s)) ASSERT_EQ(v, 0.5f);
+}
+
+TEST(Scene, WithoutLightsItIsBlack) {
+  const api::Device device(1);
+  api::Scene s = scene(device, false);
+  s.set_lights({});
+  s.commit();
+  EXPECT_EQ(mean(render(integrator(device, 10), s)), 0.0);
+}
+
+TEST(Scene, TexturesAreCopiedAndMultiplyTheColour) {
+  const api::Device device(2);
+  const api::Integrator i = integrator(device);
+  api::Scene s = scene(device);
+  auto m = materials();
+  for (auto& each : m) each.diffuse[0] *= 0.5f;
+  s.set_materials(m);
+  s.commit();
+  const auto expected = render(i, s);
+
+  m = materials();
+  for (auto& each : m) each.diffuse_texture = 1;
+  std::vector<float> pixels = {0.5f, 1, 1, 0.5f, 1, 1};
+  auto t = make<lumicut_texture>();
+  t.width = 2, t.height = 1, t.channels = 3, t.format = LUMICUT_FLOAT32, t.pixels = pixels.data();
+  s.set_textures({t});
+  s.set_materials(m);
+  pixels.assign(6, 0.0f);
+  s.commit();
+  const auto textured = render(i, s);
+  // The same but for the order of two multiplications.
+  ASSERT_EQ(textured.size(), expected.size());
+  for (size_t k = 0; k < textured.size(); ++k) ASSERT_NEAR(textured[k], expected[k], 1e-4f + 1e-4f * expected[k]);
+}
+
+TEST(Scene, BrokenNormalsAndTextureCoordinatesAreMended) {
+  const api::Device device(2);
+  const api::Integrator i = integrator(device);
+  const auto expected = render(i, scene(device));
+  const Geometry g = geometry();
+  const std::vector<float> broken(g.positions.size(), NAN);
+  auto m = g.mesh();
+  api::Scene mended(device);
+  m.normals = broken.data(), m.uvs = broken.data();
+  mended.set_materials(materials());
+  mended.add_mesh(m);
+  mended.set_lights({lamp()});
+  mended.set_camera(camera());
+  mended.commit();
+  EXPECT_EQ(render(i, mended), expected);
+}
+
+TEST(Scene, ANewCameraAsksForNoNewLights) {
+  const api::Device device(2);
+  const api::Integrator i = integrator(device);
+  api::Scene s = scene(device);
+  const auto before = render(i, s);
+  auto c = camera();
+  c.to_world[3] = 0.3f;
+  s.set_camera(c);
+  lumicut_render none = nullptr;
+  auto f = frame();
+  EXPECT_CODE(lumicut_render_start(i.get(), s.get(), &f, &none), LUMICUT_INVALID_STATE,
+              "changed since its last commit");
+  s.commit();
+  const api::Render r(i, s, f);
+  r.wait();
+  EXPECT_NE(r.read("radiance"), before);
+  EXPECT_NE(r.stats_json().find("\"prepare_reused\": 1"), std::string::npos) << r.stats_json();
+}
+
+TEST(Scene, KeepsItsDeviceAlive) {
+  lumicut_scene s = nullptr;
+  {
+    const api::Device device(1);
+    const api::Scene made = scene(device);
+    s = made.get();
+    lumicut_retain(s);
+  }
+  EXPECT_EQ(lumicut_scene_commit(s), LUMICUT_OK);
+  lumicut_release(s);
+}
+
+}  // namespace
