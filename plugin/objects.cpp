@@ -177,7 +177,8 @@ void lumicut_integrator_t::prepare(lumicut_scene_t& of, Progress& progress, Stat
   into.set_value("vpls", static_cast<double>(next->vpls->lights.size()));
   into.set_value("light_paths", static_cast<double>(next->vpls->light_paths));
   next->method = entry.create();
-  next->method->prepare(of.scene, *next->vpls, *next->params, {progress, into});
+  next->standing_off = off_surfaces(*next->vpls, of.scene);
+  next->method->prepare(of.scene, next->standing_off, *next->params, {progress, into});
   progress.check();
   prepared = std::move(next);
 }

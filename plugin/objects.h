@@ -67,7 +67,8 @@ struct Prepared {
   uint64_t scene_version = 0;
   std::string params_key, vpls_key;  // the parameters it was made with: all, those of light tracing
   uint64_t host_lights = 0;          // which of the host's sets; 0: traced
-  std::shared_ptr<const VplSet> vpls;
+  std::shared_ptr<const VplSet> vpls;  // as traced, or as the host gave them
+  VplSet standing_off;                 // the same, off their surfaces: what the method shades with
   std::optional<Params> params;
   std::unique_ptr<Integrator> method;
 };

@@ -267,7 +267,7 @@ Vpl Emitters::sample_direct(double u, uint64_t count, Rng& rng) const {
   }
   const Surface s = sample_surface(e, rng);
   const uint32_t group = e.kind == Kind::triangle ? scene_.meshes()[e.index].group : scene_.lights()[e.index].group;
-  v = oriented(offset(s), s.normal, s.radiance * (weight / s.area_pdf), group);
+  v = oriented(s.position, s.normal, s.radiance * (weight / s.area_pdf), group);
   if (e.kind != Kind::triangle && narrowed(scene_.lights()[e.index])) {
     const Vpl profile = spread_profile(scene_.lights()[e.index]);
     v.kind = VplKind::spot, v.spot_cosine = profile.spot_cosine, v.spread_tan = profile.spread_tan;

@@ -59,7 +59,7 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const Emitters& emitters, c
       const Vec3f position = surface.position + side * scene.epsilon();
       if (max_component(kd) > 0.0f) {
         Vpl v;
-        v.position = position, v.kind = VplKind::oriented, v.normal = normal, v.group = path.group;
+        v.position = surface.position, v.kind = VplKind::oriented, v.normal = normal, v.group = path.group;
         v.intensity = path.flux * kd * kInvPi;
         if (max_component(v.intensity) > 0.0f && is_finite(v.intensity)) vpls.push_back({ids[i], v});
       }
@@ -164,6 +164,13 @@ VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progr
   if (indirect > 0 && options.max_depth > 0 && !scene.bounds().empty())
     trace_indirect(scene, emitters, options, indirect, progress, set);
   return set;
+}
+
+VplSet off_surfaces(const VplSet& set, const Scene& scene) {
+  VplSet moved = set;
+  for (Vpl& v : moved.lights)
+    if (v.kind == VplKind::oriented) v.position += v.normal * scene.epsilon();
+  return moved;
 }
 
 }  // namespace lumicut

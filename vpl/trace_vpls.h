@@ -19,4 +19,8 @@ struct VplOptions {
 // Energy is normalised by the number of light paths. Deterministic. A scene without emitters gives no lights.
 VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progress);
 
+// The same lights with oriented ones moved off their surface by the scene's epsilon, so that shadow rays can start there.
+// Traced lights and a host's own lie on their surfaces.
+VplSet off_surfaces(const VplSet& set, const Scene& scene);
+
 }  // namespace lumicut

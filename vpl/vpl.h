@@ -13,7 +13,7 @@ inline constexpr int kVplKinds = 4;
 
 // Layout of lumicut_vpl in lumicut.h (64 bytes).
 struct Vpl {
-  Vec3f position{};  // oriented: off its surface by the scene's epsilon. directional: unused
+  Vec3f position{};  // directional: unused
   VplKind kind = VplKind::omni;
   Vec3f normal{};  // unit; directional: the way light travels; spot: axis; omni: 0
   uint32_t group = 0;

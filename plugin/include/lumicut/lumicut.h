@@ -273,7 +273,7 @@ LUMICUT_API lumicut_result lumicut_integrator_set(lumicut_integrator integrator,
 LUMICUT_API const char* lumicut_integrator_get(lumicut_integrator integrator, const char* name); /* [object] NULL: no such parameter */
 
 typedef struct lumicut_vpl {
-  float position[3];  /* directional: unused */
+  float position[3];  /* oriented: on its surface; directional: unused */
   uint32_t kind;      /* LUMICUT_VPL_OMNI ... */
   float normal[3];    /* unit; oriented: I falls with max(0, cos); directional: the way light travels; spot: axis */
   uint32_t group;     /* light group it came from */
