@@ -597,15 +597,6 @@ class SceneReader {
 
 }  // namespace
 
-lumicut_material default_material() {
-  lumicut_material m{};
-  m.struct_size = sizeof(m);
-  m.opacity = 1;
-  m.shininess = 1;
-  for (float& c : m.diffuse) c = 0.5f;
-  return m;
-}
-
 SceneData read_scene(const std::string& path) { return SceneReader(path).read(); }
 
 }  // namespace lumicut::io

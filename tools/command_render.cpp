@@ -193,9 +193,8 @@ class RenderCommand {
       set_parameter(api(), integrator_.get(), parameter.substr(0, equals), parameter.substr(equals + 1));
     }
     if (o_.vpl_in.empty()) return;
-    const auto lights = io::read_vpls(o_.vpl_in);
-    if (lights.empty()) throw UsageError(fmt::format("--vpl-in {}: holds no light", o_.vpl_in));
-    io::check(api(), api().integrator_set_lights(integrator_.get(), lights.data(), lights.size()), o_.vpl_in);
+    lights_ = io::read_vpls(o_.vpl_in);
+    if (lights_.lights.empty()) throw UsageError(fmt::format("--vpl-in {}: holds no light", o_.vpl_in));
   }
 
   void read_scene() {
@@ -208,6 +207,7 @@ class RenderCommand {
     stop_if_interrupted();
     io::upload_scene(api(), scene_.get(), data);
     triangles_ = data.triangle_count();
+    set_lights(data);
     desc_.struct_size = sizeof(desc_);
     desc_.width = size_.empty() ? data.width : size_[0];
     desc_.height = size_.empty() ? data.height : size_[1];
@@ -217,6 +217,13 @@ class RenderCommand {
         (crop_[0] >= crop_[2] || crop_[1] >= crop_[3] || crop_[2] > desc_.width || crop_[3] > desc_.height))
       throw UsageError(fmt::format("--crop {}: is not a part of {} x {} pixels", o_.crop, desc_.width, desc_.height));
     read_seconds_ = now() - start;
+  }
+
+  void set_lights(const io::SceneData& data) {
+    auto& lights = lights_.lights;
+    if (lights.empty()) return;
+    if (lights_.on_surfaces) io::move_off_surfaces(lights, data.surface_offset());
+    io::check(api(), api().integrator_set_lights(integrator_.get(), lights.data(), lights.size()), o_.vpl_in);
   }
 
   void commit() {
@@ -323,6 +330,7 @@ class RenderCommand {
   io::Handle<lumicut_integrator> integrator_{library_.api()};
   io::Handle<lumicut_render> render_{library_.api()};
   InterruptWatcher watcher_;  // ends before the handles that it may cancel
+  io::VplFile lights_;        // of --vpl-in
   std::vector<uint32_t> size_, crop_;
   lumicut_render_desc desc_{};
   uint64_t triangles_ = 0;

@@ -18,7 +18,7 @@ def sky(direction):
     colour = [zenith * (1 - haze) + horizon * haze for zenith, horizon in zip((0.28, 0.5, 1.0), (1.1, 0.95, 0.75))]
     glow = 1.6 * math.exp(-angle / 0.25)
     # The disk is a few pixels wide, softened, with as much irradiance as a low sun has over this sky.
-    disk = 900.0 * math.exp(-((angle / 0.03) ** 2))
+    disk = 4000.0 * math.exp(-((angle / 0.03) ** 2))
     return tuple(c + (glow + disk) * k for c, k in zip(colour, (1.0, 0.82, 0.55)))
 
 
