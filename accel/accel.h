@@ -29,7 +29,8 @@ struct Ray {
   uint32_t flags = 0;
 };
 
-// Fields in Embree's order (RTCHit). `ng` is not normalised, and in the space of the mesh (before the instance's transform).
+// Fields in Embree's order (RTCHit). `ng` is not normalised, and in the space of the mesh (before the instance's
+// transform).
 struct Hit {
   Vec3f ng;
   float u = 0.0f, v = 0.0f;  // hit = (1-u-v)·v0 + u·v1 + v·v2
@@ -73,8 +74,8 @@ struct AccelGeometry {
 };
 
 struct AccelOptions {
-  bool robust = true;         // watertight on shared edges
-  std::string builder = "";   // agglomerative accel only: see accel/bvh.h; empty: its default
+  bool robust = true;        // watertight on shared edges
+  std::string builder = "";  // agglomerative accel only: see accel/bvh.h; empty: its default
 };
 
 // What a build gave. Costs in the paper's terms. [Walter et al. 2008, Fig. 6]; 0 where the room behind does not tell.
@@ -103,8 +104,8 @@ class Accel {
                                    const float* pz, size_t n, uint8_t* occluded) const = 0;
 };
 
-// Makes the accel of that name: "embree" or "agglomerative". Runs on the caller's arena. Throws Error on an unknown name,
-// an index out of range, or a position that is not finite (naming mesh, index and value), and Error(cancelled).
+// Makes the accel of that name: "embree" or "agglomerative". Runs on the caller's arena. Throws Error on an unknown
+// name, an index out of range, or a position that is not finite (naming mesh, index and value), and Error(cancelled).
 std::unique_ptr<Accel> make_accel(const std::string& name, const AccelGeometry& geometry, const AccelOptions& options,
                                   Progress* progress = nullptr);
 

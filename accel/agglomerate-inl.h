@@ -74,7 +74,8 @@ class Core {
   Core(const Policy& policy, size_t n, bool threads, Progress* progress)
       : policy_(policy), n_(n), threads_(threads), progress_(progress) {
     features_ = hwy::AllocateAligned<float>(std::max<size_t>(1, n * k()));
-    if (!features_) throw Error(ErrorCode::out_of_memory, "agglomerate: no memory for " + std::to_string(n) + " leaves");
+    if (!features_)
+      throw Error(ErrorCode::out_of_memory, "agglomerate: no memory for " + std::to_string(n) + " leaves");
     least_.resize(n);
     std::iota(least_.begin(), least_.end(), 0u);
     node_ = least_;
@@ -97,7 +98,8 @@ class Core {
     check();
     if constexpr (!Policy::kNonDecreasing)
       if (strategy == Strategy::locally_ordered || strategy == Strategy::parallel)
-        fail_argument("agglomerate: locally ordered strategies need a dissimilarity that never falls as clusters grow (Eq. 1)");
+        fail_argument(
+            "agglomerate: locally ordered strategies need a dissimilarity that never falls as clusters grow (Eq. 1)");
     std::vector<uint32_t> active = join_coincident();
     if (active.size() > 1) {
       if (strategy == Strategy::naive) naive(active);
@@ -145,7 +147,8 @@ class Core {
     return out[0];
   }
 
-  // For each leaf the least one with the same key. Leaves are dealt out by hash, so that each share has a table that fits a cache.
+  // For each leaf the least one with the same key. Leaves are dealt out by hash, so that each share has a table that
+  // fits a cache.
   std::vector<uint32_t> first_equal() const {
     const size_t key = policy_.key_features(), shares = n_ / 4096 + 1;
     std::vector<uint32_t> hashes(n_), first(n_), dealt(n_), start(shares + 1, 0);
@@ -221,7 +224,8 @@ class Core {
     return active;
   }
 
-  // Puts clusters in an order in which runs of 8, 64, 512... lie close together: splits at medians, at multiples of `unit`.
+  // Puts clusters in an order in which runs of 8, 64, 512... lie close together: splits at medians, at multiples of
+  // `unit`.
   struct Item {
     float point[Policy::kOrderDims];
     uint32_t cluster;
@@ -267,9 +271,9 @@ class Core {
     for (size_t i = 0; i < active.size(); ++i) active[i] = items[i].cluster;
   }
 
-  // The active clusters, one a slot, under an implicit tree: block i of level L+1 sums up blocks 8i to 8i+7 of level L, one a
-  // lane, by the least of each feature and the least of their least leaves. A block of level L spans 8^(L+1) slots.
-  // [Stands for the paper's kd-tree, Fig. 3; slots are replaced and emptied in place]
+  // The active clusters, one a slot, under an implicit tree: block i of level L+1 sums up blocks 8i to 8i+7 of level L,
+  // one a lane, by the least of each feature and the least of their least leaves. A block of level L spans 8^(L+1)
+  // slots. [Stands for the paper's kd-tree, Fig. 3; slots are replaced and emptied in place]
   class BestMatchTree {
    public:
     explicit BestMatchTree(const Core& core) : core_(core), stride_((core.k() + 1) * 8) {}
@@ -324,7 +328,8 @@ class Core {
     void set(size_t slot, uint32_t cluster, size_t top) {
       float* leaf = block(0, slot / 8);
       const size_t features = core_.k();
-      for (size_t f = 0; f < features; ++f) leaf[8 * f + slot % 8] = cluster == kNone ? kInfinity : core_.of(cluster)[f];
+      for (size_t f = 0; f < features; ++f)
+        leaf[8 * f + slot % 8] = cluster == kNone ? kInfinity : core_.of(cluster)[f];
       ids(leaf)[slot % 8] = cluster == kNone ? kNone : core_.least_[cluster];
       size_t at = slot / 8;
       for (size_t l = 1; l <= top; ++l, at /= 8)
@@ -332,8 +337,8 @@ class Core {
     }
 
     // The best match of the cluster in `slot`, where it is better than `best`; else `best` as it is.
-    // Starts at the cluster's own leaf and climbs; at each level looks down into the siblings that may hold a better one.
-    // Up to level `top` in this tree, further up in `outside`.
+    // Starts at the cluster's own leaf and climbs; at each level looks down into the siblings that may hold a better
+    // one. Up to level `top` in this tree, further up in `outside`.
     Match find(uint32_t cluster, size_t slot, Match best, size_t top, const BestMatchTree* outside) const {
       const auto query = core_.policy_.query(Lanes8(), core_.of(cluster));
       visit_leaf(query, slot / 8, 1u << (slot % 8), best);
@@ -435,7 +440,9 @@ class Core {
         if (costs[lane] == best.cost && least >= best.least) continue;
         const Pending p{costs[lane], least, static_cast<uint32_t>(level - 1), static_cast<uint32_t>(8 * at) + lane};
         size_t i = top++;
-        for (; i > bottom && (stack[i - 1].cost < p.cost || (stack[i - 1].cost == p.cost && stack[i - 1].least < p.least)); --i)
+        for (; i > bottom &&
+               (stack[i - 1].cost < p.cost || (stack[i - 1].cost == p.cost && stack[i - 1].least < p.least));
+             --i)
           stack[i] = stack[i - 1];
         stack[i] = p;
       }
@@ -524,12 +531,13 @@ class Core {
     }
   }
 
-  // Fig. 4 over the slots [begin, end), which the block of level `top` over them spans, with the chain kept as a stack: what lies
-  // below the top stays a chain of best matches when the top merges. Stops when `stop_at` clusters are left.
-  // Where a cluster's best match lies outside (in `outside`, a copy of the tree from before), the chain ends there and its
-  // clusters rest: clusters outside only grow, so by Eq. 1 whatever merges inside is right whatever happens outside.
-  void chain_within(BestMatchTree& tree, const BestMatchTree* outside, size_t top, size_t begin, size_t end, size_t stop_at,
-                    uint32_t first_id, std::vector<uint32_t>& in_slot, std::vector<Merge>& merges) {
+  // Fig. 4 over the slots [begin, end), which the block of level `top` over them spans, with the chain kept as a stack:
+  // what lies below the top stays a chain of best matches when the top merges. Stops when `stop_at` clusters are left.
+  // Where a cluster's best match lies outside (in `outside`, a copy of the tree from before), the chain ends there and
+  // its clusters rest: clusters outside only grow, so by Eq. 1 whatever merges inside is right whatever happens
+  // outside.
+  void chain_within(BestMatchTree& tree, const BestMatchTree* outside, size_t top, size_t begin, size_t end,
+                    size_t stop_at, uint32_t first_id, std::vector<uint32_t>& in_slot, std::vector<Merge>& merges) {
     struct Link {
       uint32_t slot;
       Match match;  // the link before: what a better match must beat
@@ -584,19 +592,21 @@ class Core {
       tree.build(active);
       in_slot = active;
       const size_t stop_at = active.size() > 64 ? active.size() / 2 : 1;
-      chain_within(tree, nullptr, tree.levels() - 1, 0, active.size(), stop_at, static_cast<uint32_t>(n_), in_slot, merges_);
+      chain_within(tree, nullptr, tree.levels() - 1, 0, active.size(), stop_at, static_cast<uint32_t>(n_), in_slot,
+                   merges_);
       keep_alive(in_slot, active);
     }
   }
 
-  // Chains run at once in regions: subtrees of the search tree, whose size depends on the number of clusters alone. When all
-  // have come to rest, what is left is put in new regions. So the tree is the same on any number of threads.
+  // Chains run at once in regions: subtrees of the search tree, whose size depends on the number of clusters alone.
+  // When all have come to rest, what is left is put in new regions. So the tree is the same on any number of threads.
   void regions(std::vector<uint32_t> active) {
     BestMatchTree tree(*this), before(*this);
     std::vector<uint32_t> in_slot;
     std::vector<std::vector<Merge>> merges;
     for (;;) {
-      const size_t m = active.size(), top = m > (1u << 21) ? 4 : (m > (1u << 16) ? 3 : 2), span = size_t{1} << (3 * (top + 1));
+      const size_t m = active.size(), top = m > (1u << 21) ? 4 : (m > (1u << 16) ? 3 : 2),
+                   span = size_t{1} << (3 * (top + 1));
       if (m < 4 * span) return chain(std::move(active));
       sort_in_space(active);
       tree.build(active);
@@ -607,11 +617,13 @@ class Core {
       merges.assign(count, {});
       for_chunks(count, 1, [&](size_t region, size_t) {
         const size_t begin = region * span, end = std::min(m, begin + span);
-        chain_within(tree, &before, top, begin, end, 1, first_id + static_cast<uint32_t>(begin), in_slot, merges[region]);
+        chain_within(tree, &before, top, begin, end, 1, first_id + static_cast<uint32_t>(begin), in_slot,
+                     merges[region]);
       });
       // Ids were given with gaps, since no region knows how many merges another has.
       for (size_t region = 0; region < count; ++region) {
-        const auto gapped = first_id + static_cast<uint32_t>(region * span), shift = gapped - static_cast<uint32_t>(n_ + merges_.size());
+        const auto gapped = first_id + static_cast<uint32_t>(region * span),
+                   shift = gapped - static_cast<uint32_t>(n_ + merges_.size());
         for (Merge merge : merges[region]) {
           if (merge.left >= first_id) merge.left -= shift;
           if (merge.right >= first_id) merge.right -= shift;
@@ -633,7 +645,8 @@ class Core {
     const auto n = static_cast<uint32_t>(n_);
     std::vector<uint32_t> id(merges_.size()), least(merges_.size());
     const auto least_of = [&](uint32_t node) { return node < n ? node : least[node - n]; };
-    for (size_t i = 0; i < merges_.size(); ++i) least[i] = std::min(least_of(merges_[i].left), least_of(merges_[i].right));
+    for (size_t i = 0; i < merges_.size(); ++i)
+      least[i] = std::min(least_of(merges_[i].left), least_of(merges_[i].right));
     struct Visit {
       uint32_t merge;
       bool done;

@@ -2,6 +2,7 @@
 #include <string>
 
 #include "accel/accel.h"
+#include "accel/bvh.h"
 #include "accel/embree_accel.h"
 #include "accel/validate.h"
 #include "core/error.h"
@@ -80,8 +81,11 @@ Aabb bounds_of(const AccelGeometry& geometry) {
 
 std::unique_ptr<Accel> make_accel(const std::string& name, const AccelGeometry& geometry, const AccelOptions& options,
                                   Progress* progress) {
-  validate(geometry, progress);
-  if (name == "embree") return make_embree_accel(geometry, options, progress);
+  if (name == "agglomerative") return Bvh::from_geometry(geometry, options, progress);
+  if (name == "embree") {
+    validate(geometry, progress);
+    return make_embree_accel(geometry, options, progress);
+  }
   fail_argument("accel: no accel is called '" + name + "'; there are 'embree' and 'agglomerative'");
 }
 

@@ -355,7 +355,8 @@ TEST_P(Rooms, TrianglesWithHugeCoordinatesAreLeftOutAndTheRestIsSeen) {
   EXPECT_EQ(first(*accel, ray_of({-5, 0.2f, 0}, {0, 0, 1})).hit.geom, kNoId);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, Rooms, testing::Values("embree", "host"), [](const auto& room) { return room.param; });
+INSTANTIATE_TEST_SUITE_P(All, Rooms, testing::Values("embree", "agglomerative", "host"),
+                         [](const auto& room) { return room.param; });
 
 TEST(MakeAccel, UnknownNameIsNamed) {
   try {
@@ -368,7 +369,7 @@ TEST(MakeAccel, UnknownNameIsNamed) {
 
 TEST(MakeAccel, CancelStopsTheBuild) {
   const Mesh mesh = test::random_soup(200000, 0.01f, 9);
-  for (const char* name : {"embree"}) {
+  for (const char* name : {"embree", "agglomerative"}) {
     Progress progress;
     progress.cancel();
     EXPECT_THROW(make_accel(name, {{mesh.view()}, {}, nullptr}, {}, &progress), Error);

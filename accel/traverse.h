@@ -1,0 +1,37 @@
+// Rays through WideBvhs: single rays, and bundles of up to 64 that share an end. Picks AVX-512, AVX2, SSE4 or the
+// portable fallback at run time.
+#pragma once
+
+#include <span>
+
+#include "accel/accel.h"
+#include "accel/wide_bvh.h"
+
+namespace lumicut {
+
+// What traversal reads. Each thing a scene does not use is compiled out of the loops that it runs.
+struct TraceScene {
+  struct Instance {
+    Transform inverse;  // world to mesh
+    const WideBvh* bvh = nullptr;
+  };
+  const WideBvh* top = nullptr;  // over primitives, or over instances
+  std::span<const Instance> instances;
+  const HitFilter* filter = nullptr;
+  const uint8_t* has_cutout = nullptr;  // by mesh
+  bool robust = true;
+  bool boxes = false;  // leaves hold boxes, not triangles
+  bool masks = false;  // some mesh has a mask that is not all ones
+  bool instanced = false;
+};
+
+void trace_closest(const TraceScene& scene, std::span<RayHit> rays);
+void trace_any(const TraceScene& scene, std::span<Ray> rays);
+// See Accel::occluded_from_point.
+void trace_points(const TraceScene& scene, const Vec3f& light, bool directional, const float* px, const float* py,
+                  const float* pz, size_t n, uint8_t* occluded);
+
+// The instruction set in use: "AVX3", "AVX2", "SSE4", or a portable one ("SCALAR", "EMU128").
+const char* traversal_target();
+
+}  // namespace lumicut
