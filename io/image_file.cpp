@@ -33,6 +33,20 @@ std::array<std::string, 3> channel_names(const ImageLayer& layer) {
   return {layer.name + ".R", layer.name + ".G", layer.name + ".B"};
 }
 
+// A broken header may promise more pixels than memory holds: refuse before allocating.
+void check_plausible(const std::string& path, const Imf::Header& header, uint64_t pixels) {
+  uint64_t channels = 0;
+  for (auto it = header.channels().begin(); it != header.channels().end(); ++it) ++channels;
+  const auto compression = header.compression();
+  const bool deflate = compression == Imf::NO_COMPRESSION || compression == Imf::RLE_COMPRESSION ||
+                       compression == Imf::ZIP_COMPRESSION || compression == Imf::ZIPS_COMPRESSION;
+  // Deflate shrinks at most 1032 times, to two bytes a value or more; the other methods know no such limit.
+  const uint64_t most = deflate ? std::filesystem::file_size(path) * 1032 / 2 + 1024 : kMaxPixels;
+  if (pixels * channels > most)
+    throw FileError(path,
+                    fmt::format("promises {} pixels of {} channels, more than its size can hold", pixels, channels));
+}
+
 }  // namespace
 
 const ImageLayer* Image::find(const std::string& name) const {
@@ -93,6 +107,7 @@ Image read_exr(const std::string& path) {
   std::error_code code;
   if (!std::filesystem::is_regular_file(path, code)) throw FileError(path, "no such file");
   try {
+    Imf::Header::setMaxImageSize(1 << 20, 1 << 20);
     Imf::InputFile in(path.c_str());
     const Imf::Header& header = in.header();
     const Imath::Box2i window = header.dataWindow();
@@ -101,6 +116,7 @@ Image read_exr(const std::string& path) {
     if (width < 1 || height < 1 || width > 1 << 20 || height > 1 << 20 ||
         static_cast<uint64_t>(width * height) > kMaxPixels)
       throw FileError(path, fmt::format("{} x {} pixels cannot be read", width, height));
+    check_plausible(path, header, static_cast<uint64_t>(width * height));
     Image image;
     image.width = static_cast<int>(width), image.height = static_cast<int>(height);
     image.x0 = window.min.x, image.y0 = window.min.y;

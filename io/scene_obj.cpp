@@ -274,6 +274,19 @@ class ObjReader {
     fail(fmt::format("the material \"{}\" stands in no MTL of this file", shown(name)));
   }
 
+  // tinyobjloader's numbers wrap around, and end at the first strange character.
+  void check_face_line() const {
+    const auto line = buffer_.last_line();
+    int digits = 0;
+    for (size_t at = line.find('f') + 1; at < line.size() && line[at] != '#'; ++at) {
+      const char c = line[at];
+      digits = c >= '0' && c <= '9' ? digits + 1 : 0;
+      if (digits > 9) fail("an index out of range (more than nine digits)");
+      if (digits == 0 && c != ' ' && c != '\t' && c != '/' && c != '-')
+        fail(fmt::format("'{}' stands among the indices", shown({&c, 1})));
+    }
+  }
+
   int64_t resolve(int index, size_t count, const char* what) const {
     const auto n = static_cast<int64_t>(count);
     const int64_t resolved = index > 0 ? int64_t{index} - 1 : n + index;
@@ -287,6 +300,7 @@ class ObjReader {
     if (count < 3) fail(fmt::format("a face of {} corners", count));
     if (static_cast<size_t>(count) > kMaxCorners)
       fail(fmt::format("a face of {} corners; at most {} are read", count, kMaxCorners));
+    check_face_line();
     polygon_.clear();
     bool smooth = true;
     for (int i = 0; i < count; ++i) {

@@ -1,0 +1,331 @@
+#include "io/scene_json.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "io/image_file.h"
+#include "tests/io/temporary_folder.h"
+
+namespace lumicut::io {
+namespace {
+
+using nlohmann::json;
+
+const char kScene[] = R"({
+  "image": {"size": [64, 32], "samples": 4},
+  "camera": {"eye": [0, 0, 5], "at": [0, 0, 0], "fov_y": 60},
+  "materials": [{"name": "grey", "diffuse": [0.5, 0.5, 0.5]}],
+  "meshes": [{"positions": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "quads": [[0, 1, 2, 3]], "material": "grey"}],
+  "lights": [{"type": "point", "position": [0, 0, 2], "value": 10}]
+})";
+
+SceneData read(const json& scene) {
+  const TemporaryFolder folder;
+  return read_scene(folder.write("scene.json", scene.dump()));
+}
+
+// The error of the example scene after `change`.
+template <typename Change>
+std::string error(Change change) {
+  json scene = json::parse(kScene);
+  change(scene);
+  return error_of([&] { read(scene); });
+}
+
+template <typename Change>
+SceneData changed(Change change) {
+  json scene = json::parse(kScene);
+  change(scene);
+  return read(scene);
+}
+
+TEST(SceneJson, ASmallSceneIsReadWhole) {
+  const SceneData scene = changed([](json&) {});
+  EXPECT_EQ(scene.width, 64u);
+  EXPECT_EQ(scene.height, 32u);
+  EXPECT_EQ(scene.samples, 4u);
+  EXPECT_EQ(scene.triangle_count(), 2u);
+  ASSERT_EQ(scene.lights.size(), 1u);
+  EXPECT_EQ(scene.lights[0].type, uint32_t{LUMICUT_POINT});
+  EXPECT_EQ(scene.lights[0].value, 10.0f);
+  EXPECT_NEAR(scene.camera.fov_y, M_PI / 3, 1e-6);
+  const float expected[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 5};
+  for (int i = 0; i < 12; ++i) EXPECT_EQ(scene.camera.to_world[i], expected[i]) << i;
+  EXPECT_TRUE(scene.warnings.empty());
+}
+
+TEST(SceneJson, TheCameraStandsAsItsAxesSay) {
+  const SceneData scene = changed([](json& s) {
+    s["up"] = "z";
+    s["camera"] = {
+        {"type", "orthographic"}, {"eye", {3, 0, 0}}, {"at", {0, 0, 0}}, {"height", 4}, {"shift", {0.5, -1}}};
+  });
+  // Looks along -x with z up: right is +y, back is +x.
+  const float expected[12] = {0, 0, 1, 3, 1, 0, 0, 0, 0, 1, 0, 0};
+  for (int i = 0; i < 12; ++i) EXPECT_EQ(scene.camera.to_world[i], expected[i]) << i;
+  EXPECT_EQ(scene.camera.orthographic, 1u);
+  EXPECT_EQ(scene.camera.height, 4.0f);
+  EXPECT_EQ(scene.camera.shift[1], -1.0f);
+}
+
+TEST(SceneJson, UnitScaleTurnsLengthsIntoMetresAndNothingElse) {
+  const SceneData scene = changed([](json& s) {
+    s["unit_scale"] = 0.01;
+    s["lights"].push_back(
+        {{"type", "rectangle"}, {"position", {0, 300, 0}}, {"u", {100, 0, 0}}, {"v", {0, 0, 50}}, {"value", 7}});
+    s["camera"]["near"] = 10;
+    s["meshes"][0]["instances"] = {{{"translate", {100, 0, 0}}}, {{"translate", {0, 200, 0}}}};
+  });
+  EXPECT_NEAR(scene.camera.to_world[11], 0.05, 1e-7);
+  EXPECT_NEAR(scene.camera.near_clip, 0.1, 1e-7);
+  EXPECT_NEAR(scene.meshes[0].positions[3], 0.01, 1e-8);
+  EXPECT_NEAR(scene.meshes[0].transforms[3], 1, 1e-7);
+  EXPECT_NEAR(scene.meshes[0].transforms[12 + 7], 2, 1e-7);
+  EXPECT_NEAR(scene.lights[0].position[2], 0.02, 1e-8);
+  EXPECT_EQ(scene.lights[0].value, 10.0f);
+  EXPECT_NEAR(scene.lights[1].u[0], 1, 1e-7);
+  EXPECT_EQ(scene.lights[1].value, 7.0f);
+}
+
+TEST(SceneJson, OneTransformIsBakedAndAMirrorKeepsTheFront) {
+  const SceneData scene = changed([](json& s) {
+    s["meshes"][0]["normals"] = {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {0, 0, 1}};
+    s["meshes"][0]["transform"] = {{"scale", {2, 1, -1}}, {"translate", {0, 0, 3}}};
+  });
+  const Mesh& mesh = scene.meshes[0];
+  EXPECT_TRUE(mesh.transforms.empty());
+  EXPECT_EQ(mesh.positions[3], 2.0f);
+  EXPECT_EQ(mesh.positions[5], 3.0f);
+  EXPECT_EQ(mesh.normals[2], -1.0f);
+  EXPECT_EQ(mesh.indices, (std::vector<uint32_t>{0, 2, 1, 0, 3, 2})) << "wound as its turned normals say";
+  const SceneData turned = changed([](json& s) {
+    s["meshes"][0]["transform"] = {{"rotate", {{"axis", {0, 0, 2}}, {"degrees", 90}}}};
+  });
+  EXPECT_NEAR(turned.meshes[0].positions[4], 1, 1e-6) << "x turns to y";
+}
+
+TEST(SceneJson, VisibleLightsAreMeshesThatEmitAndReflectNothing) {
+  const SceneData scene = changed([](json& s) {
+    s["lights"] = {{{"type", "rectangle"},
+                    {"corner", {0, 2, 0}},
+                    {"u", {0, 0, 2}},
+                    {"v", {3, 0, 0}},
+                    {"value", 5},
+                    {"visible", true}},
+                   {{"type", "disk"},
+                    {"position", {0, 2, 0}},
+                    {"u", {2, 0, 0}},
+                    {"v", {0, 0, -2}},
+                    {"value", 100},
+                    {"unit", "watt"},
+                    {"visible", true}}};
+  });
+  EXPECT_TRUE(scene.lights.empty());
+  ASSERT_EQ(scene.meshes.size(), 3u);
+  const auto area_normal = [](const Mesh& mesh) {  // sum over triangles, y component
+    double sum = 0;
+    for (size_t i = 0; i < mesh.indices.size(); i += 3) {
+      const float* a = &mesh.positions[mesh.indices[i] * 3];
+      const float* b = &mesh.positions[mesh.indices[i + 1] * 3];
+      const float* c = &mesh.positions[mesh.indices[i + 2] * 3];
+      sum += 0.5 * (double{b[2] - a[2]} * (c[0] - a[0]) - double{b[0] - a[0]} * (c[2] - a[2]));
+    }
+    return sum;
+  };
+  const auto& quad = scene.materials[scene.meshes[1].materials[0]].values;
+  EXPECT_EQ(quad.emission[0], 5.0f);
+  EXPECT_EQ(quad.diffuse[0] + quad.specular[0], 0.0f);
+  EXPECT_EQ(quad.flags, 0u) << "one-sided";
+  EXPECT_NEAR(area_normal(scene.meshes[1]), 6, 1e-6) << "u x v points up";
+  EXPECT_NEAR(area_normal(scene.meshes[2]), M_PI, 1e-5) << "as large as the disk";
+  const auto& disk = scene.materials[scene.meshes[2].materials[0]].values;
+  EXPECT_NEAR(disk.emission[0], 100 / (M_PI * M_PI), 1e-4) << "power / (pi area)";
+}
+
+TEST(SceneJson, TheEnvironmentTurnsWithUpAndRotation) {
+  const auto map = [](const SceneData& scene, double x, double y, double z) {
+    const float* m = scene.environment->world_to_map;
+    std::array<double, 3> out{};
+    for (size_t k = 0; k < 3; ++k) out[k] = m[k * 3] * x + m[k * 3 + 1] * y + m[k * 3 + 2] * z;
+    return out;
+  };
+  SceneData scene = changed([](json& s) { s["environment"] = {{"color", {1, 2, 3}}, {"strength", 2}}; });
+  EXPECT_EQ(scene.environment->color[1], 4.0f);
+  EXPECT_NEAR(map(scene, 0, 1, 0)[2], 1, 1e-6) << "the world's y is the map's up";
+  EXPECT_NEAR(map(scene, 1, 0, 0)[0], 1, 1e-6);
+  EXPECT_NEAR(map(scene, 0, 0, -1)[1], 1, 1e-6);
+  scene = changed([](json& s) { s["up"] = "z", s["camera"]["up"] = {0, 1, 0}, s["environment"] = {{"rotation", 90}}; });
+  EXPECT_NEAR(map(scene, 0, 0, 1)[2], 1, 1e-6);
+  // What stood at the map's x now stands at the world's y.
+  EXPECT_NEAR(map(scene, 0, 1, 0)[0], 1, 1e-6);
+}
+
+TEST(SceneJson, MaterialsOfAnObjCanBeChangedByName) {
+  const TemporaryFolder folder;
+  folder.write("m.mtl", "newmtl floor\nKd 0.2 0.2 0.2\nNs 5\n\nnewmtl wall\nKd 0.7 0.7 0.7\n");
+  folder.write("a.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl floor\nf 1 2 3\nusemtl wall\nf 1 2 3\n");
+  json scene = json::parse(kScene);
+  scene["meshes"] = {{{"obj", "a.obj"}, {"materials", {{"floor", {{"specular", {0.3, 0.3, 0.3}}}}, {"wall", "grey"}}}}};
+  const SceneData data = read_scene(folder.write("scene.json", scene.dump()));
+  const auto& floor = data.materials[data.meshes[0].materials[0]].values;
+  EXPECT_EQ(floor.diffuse[0], 0.2f);
+  EXPECT_EQ(floor.specular[0], 0.3f);
+  EXPECT_EQ(floor.shininess, 5.0f);
+  EXPECT_EQ(data.materials[data.meshes[0].materials[1]].name, "grey");
+  scene["meshes"][0]["materials"] = {{"flor", "grey"}};
+  expect_in(error_of([&] { read_scene(folder.write("scene.json", scene.dump())); }),
+            {"meshes[0].materials", "\"flor\"", "\"floor\""});
+}
+
+TEST(SceneJson, PathsMayNameEnvironmentVariables) {
+  const TemporaryFolder folder;
+  folder.write("sub/a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  json scene = json::parse(kScene);
+  scene["meshes"] = {{{"obj", "${LUMICUT_TEST_FOLDER}/a.obj"}}};
+  const std::string file = folder.write("scene.json", scene.dump());
+  unsetenv("LUMICUT_TEST_FOLDER");
+  expect_in(error_of([&] { read_scene(file); }), {"meshes[0].obj", "LUMICUT_TEST_FOLDER", "not set"});
+  setenv("LUMICUT_TEST_FOLDER", (folder / "sub").c_str(), 1);
+  EXPECT_EQ(read_scene(file).triangle_count(), 1u);
+  setenv("LUMICUT_TEST_FOLDER", "${LUMICUT_TEST_FOLDER}", 1);
+  expect_in(error_of([&] { read_scene(file); }), {"LUMICUT_TEST_FOLDER"});
+  unsetenv("LUMICUT_TEST_FOLDER");
+}
+
+TEST(SceneJson, SyntaxErrorsNameLineAndColumn) {
+  const TemporaryFolder folder;
+  const auto text_error = [&](const std::string& text) {
+    return error_of([&] { read_scene(folder.write("s.json", text)); });
+  };
+  expect_in(text_error("{\n  \"camera\": {,\n}"), {"s.json", "line 2, column 14"});
+  expect_in(text_error(""), {"s.json", "line 1"});
+  expect_in(text_error("{\"camera\": NaN}"), {"line 1"});
+  expect_in(text_error("{\"unit_scale\": 1e999}"), {"s.json", "1e999"});
+  expect_in(text_error("{\"up\": \"y\", \"up\": \"z\"}"), {"\"up\"", "twice"});
+  expect_in(text_error(std::string(100000, '[')), {"nested deeper"});
+  expect_in(text_error("[1, 2]"), {"s.json", "an object"});
+  expect_in(text_error("\xff\xfe{}"), {"s.json", "line 1"});
+  expect_in(error_of([&] { read_scene(folder / "none.json"); }), {"none.json", "no such file"});
+  const std::string whole = kScene;
+  for (size_t length = 0; length < whole.size() - 1; ++length)
+    expect_in(text_error(whole.substr(0, length)), {"s.json"});
+}
+
+TEST(SceneJson, UnknownKeysAreNamedWithTheNearest) {
+  expect_in(error([](json& s) { s["ligths"] = json::array(); }), {"scene.json", "\"ligths\"", "\"lights\""});
+  expect_in(error([](json& s) { s["camera"]["fov"] = 3; }), {"camera", "\"fov\"", "\"fov_y\""});
+  expect_in(error([](json& s) { s["lights"][0]["colour"] = 3; }), {"lights[0]", "\"colour\"", "\"color\""});
+  expect_in(error([](json& s) { s["meshes"][0]["xyzzy"] = 3; }), {"meshes[0]", "\"xyzzy\"", "known are"});
+}
+
+TEST(SceneJson, MissingKeysAreNamed) {
+  expect_in(error([](json& s) { s.erase("camera"); }), {"needs the key \"camera\""});
+  expect_in(error([](json& s) { s["camera"].erase("fov_y"); }), {"camera", "\"fov_y\""});
+  expect_in(error([](json& s) { s["lights"][0].erase("value"); }), {"lights[0]", "\"value\""});
+  expect_in(error([](json& s) {
+              s["lights"][0].erase("position");
+              s["lights"][0]["positon"] = {0, 0, 0};
+            }),
+            {"lights[0]", "\"position\"", "\"positon\" misspelt"});
+  expect_in(error([](json& s) { s["meshes"][0].erase("positions"); }), {"meshes[0]", "\"obj\"", "\"positions\""});
+  expect_in(error([](json& s) { s["meshes"][0].erase("quads"); }), {"meshes[0]", "\"triangles\""});
+  expect_in(error([](json& s) { s["meshes"] = json::array(); }), {"neither meshes"});
+}
+
+TEST(SceneJson, WrongValuesAreNamedWithPathAndValue) {
+  const auto at = [](const char* pointer, json value) {
+    return error([&](json& s) { s[json::json_pointer(pointer)] = value; });
+  };
+  expect_in(at("/camera/fov_y", "wide"), {"camera.fov_y", "\"wide\"", "number"});
+  expect_in(at("/camera/fov_y", 180), {"camera.fov_y", "180", "179"});
+  expect_in(at("/camera/fov_y", 0), {"camera.fov_y", "0"});
+  expect_in(at("/camera/eye", {1, 2}), {"camera.eye", "[1,2]", "3 numbers"});
+  expect_in(at("/camera/eye/1", nullptr), {"camera.eye[1]", "null"});
+  expect_in(at("/camera/eye/1", 1e35), {"camera.eye[1]", "1e+35"});
+  expect_in(at("/camera/at", {0, 0, 5}), {"camera.at", "same point"});
+  expect_in(at("/camera/up", {0, 0, 1}), {"camera", "along its own"});
+  expect_in(at("/camera/type", "fisheye"), {"camera.type", "fisheye", "perspective, orthographic"});
+  expect_in(at("/camera/matrix", {1, 0, 0}), {"camera.matrix", "12 numbers"});
+  expect_in(at("/camera/matrix", std::vector<int>(12, 0)), {"camera.matrix", "determinant"});
+  expect_in(at("/camera/lens_radius", 1), {"camera", "focus_distance"});
+  expect_in(at("/image/size", {0, 10}), {"image.size[0]", "0"});
+  expect_in(at("/image/size", {1e6, 10}), {"image.size[0]"});
+  expect_in(at("/image/samples", 1.5), {"image.samples", "1.5", "whole"});
+  expect_in(at("/image/samples", -1), {"image.samples", "-1"});
+  expect_in(at("/image/samples", 18446744073709551615ull), {"image.samples"});
+  expect_in(at("/unit_scale", 0), {"unit_scale", "0"});
+  expect_in(at("/up", "x"), {"up", "\"x\"", "y, z"});
+  expect_in(at("/materials/0/diffuse/2", 1.5), {"materials[0].diffuse[2]", "1.5"});
+  expect_in(at("/materials/0/diffuse/2", -0.1), {"materials[0].diffuse[2]", "-0.1"});
+  expect_in(at("/materials/0/model", "ward"), {"materials[0].model", "ward", "blinn, phong"});
+  expect_in(at("/materials/0/diffuse_texture", "no.png"),
+            {"no.png", "no such texture", "\"grey\"", "materials[0].diffuse_texture"});
+  expect_in(at("/materials/1", {{"name", "grey"}}), {"materials[1].name", "already"});
+  expect_in(at("/meshes/0/material", "gray"), {"meshes[0].material", "\"gray\"", "\"grey\""});
+  expect_in(at("/meshes/0/quads/0/3", 4), {"meshes[0].quads[0][3]", "4", "from 0 to 3"});
+  expect_in(at("/meshes/0/quads/0/3", -1), {"meshes[0].quads[0][3]", "-1"});
+  expect_in(at("/meshes/0/quads/0/3", 1.5), {"meshes[0].quads[0][3]", "1.5"});
+  expect_in(at("/meshes/0/quads/0", {0, 1, 2}), {"meshes[0].quads[0]", "4 vertex numbers"});
+  expect_in(at("/meshes/0/quads", json::array()), {"meshes[0]", "no \"triangles\""});
+  expect_in(at("/meshes/0/positions", json::array()), {"meshes[0].positions", "empty"});
+  expect_in(at("/meshes/0/normals", json::parse("[[0,0,1]]")), {"meshes[0].normals", "1 entries for 4"});
+  expect_in(at("/meshes/0/instances", json::array()), {"meshes[0].instances", "empty"});
+  expect_in(at("/meshes/0/transform", {{"scale", 0}}), {"meshes[0].transform", "determinant"});
+  expect_in(at("/meshes/0/transform", {{"scale", 1e30}, {"translate", {1e30, 0, 0}}}), {"meshes[0]", "range"});
+  expect_in(at("/meshes/0/group", 70000), {"meshes[0].group", "70000"});
+  expect_in(at("/meshes/0", {{"obj", ""}}), {"meshes[0].obj", "empty"});
+  expect_in(at("/meshes/0", {{"obj", "none.obj"}}), {"none.obj", "no such file"});
+  expect_in(at("/meshes/0", {{"obj", "."}}), {"is a folder"});
+  expect_in(at("/meshes", 5), {"meshes", "5", "array"});
+  expect_in(at("/meshes/0", 5), {"meshes[0]", "object"});
+  expect_in(at("/lights/0/type", "laser"), {"lights[0].type", "laser", "point, spot"});
+  expect_in(at("/lights/0/value", -1), {"lights[0].value", "-1"});
+  expect_in(at("/lights/0/unit", "lumen"), {"lights[0].unit", "lumen"});
+  expect_in(at("/lights/0", json::parse(R"({"type":"sun","value":1,"direction":[0,0,0]})")),
+            {"lights[0].direction", "zero"});
+  expect_in(
+      at("/lights/0", json::parse(R"({"type":"rectangle","value":1,"position":[0,0,0],"u":[1,0,0],"v":[2,0,0]})")),
+      {"lights[0].v", "parallel"});
+  expect_in(
+      at("/lights/0",
+         json::parse(
+             R"({"type":"rectangle","value":1,"position":[0,0,0],"u":[1,0,0],"v":[0,2,0],"visible":true,"spread":90})")),
+      {"lights[0].spread", "visible"});
+  expect_in(at("/environment", {{"image", "none.hdr"}}), {"none.hdr", "environment"});
+}
+
+TEST(SceneJson, EnvironmentsThatAreNotFiniteNameThePixel) {
+  const TemporaryFolder folder;
+  Image image;
+  image.width = 2, image.height = 1;
+  image.layers = {{"radiance", 3, {1, 1, 1, 1, NAN, 1}}};
+  write_exr(folder / "sky.exr", image, false);
+  json scene = json::parse(kScene);
+  scene["environment"] = {{"image", "sky.exr"}};
+  const std::string file = folder.write("scene.json", scene.dump());
+  expect_in(error_of([&] { read_scene(file); }), {"sky.exr", "pixel (1, 0)", "nan"});
+  image.layers[0].pixels[4] = 3;
+  write_exr(folder / "sky.exr", image, false);
+  const SceneData data = read_scene(file);
+  EXPECT_EQ(data.textures.at(0).floats, (std::vector<float>{1, 1, 1, 1, 3, 1}));
+  EXPECT_EQ(data.environment->texture, 1);
+}
+
+TEST(SceneJson, ASceneWithoutLightWarns) {
+  const SceneData scene = changed([](json& s) { s.erase("lights"); });
+  ASSERT_EQ(scene.warnings.size(), 1u);
+  expect_in(scene.warnings[0], {"no light"});
+}
+
+TEST(SceneJson, OurOwnScenesAreRead) {
+  const char* root = std::getenv("LUMICUT_SOURCE_DIR");
+  ASSERT_NE(root, nullptr) << "set by CTest";
+  for (const char* name : {"cornell_box", "indirect_room", "court"}) {
+    const SceneData scene = read_scene(std::string(root) + "/reference_images/" + name + "/" + name + ".json");
+    EXPECT_GT(scene.triangle_count(), 20u) << name;
+    EXPECT_TRUE(scene.warnings.empty()) << name << ": " << scene.warnings[0];
+  }
+}
+
+}  // namespace
+}  // namespace lumicut::io
