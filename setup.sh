@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# Installs what a fresh Debian 12 machine lacks to build and test Lumicut. Says what it installs; installs nothing twice.
+set -euo pipefail
+
+packages=(
+  build-essential cmake ninja-build pkg-config git ccache clang-format  # tools
+  libembree-dev libtbb-dev libhwy-dev                                   # the library: rays, threads, SIMD
+  libopenexr-dev libimath-dev libopenimageio-dev libtinyobjloader-dev   # the command's files
+  nlohmann-json3-dev libcli11-dev libfmt-dev                            # the command's words
+  libcgal-dev libgmp-dev libmpfr-dev                                    # geometry/ (a target of its own)
+  libgtest-dev libgmock-dev libbenchmark-dev python3 python3-numpy      # tests and benchmarks
+  binutils                                                              # a test reads the library's symbols
+)
+
+missing=()
+for package in "${packages[@]}"; do
+  dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q "ok installed" || missing+=("$package")
+done
+if [ ${#missing[@]} -eq 0 ]; then
+  echo "setup: all ${#packages[@]} packages are installed"
+  exit 0
+fi
+
+echo "setup: installing ${missing[*]}"
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  command -v sudo >/dev/null || { echo "setup: run as root, or install sudo" >&2; exit 1; }
+  as_root=(sudo)
+fi
+"${as_root[@]}" apt-get update -q
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}"
+echo "setup: done"

@@ -1,0 +1,96 @@
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "tests/support/render.h"
+
+namespace lumicut {
+
+TEST(Lightcuts, EqualsExhaustiveAtNoError) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 3000);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}),
+             frame = test::render(*scene, "lightcuts", vpls, {{"error", "0"}});
+  EXPECT_LT(test::mean_relative_error(frame.radiance, reference.radiance), 1e-5);  // order of summation alone
+}
+
+TEST(Lightcuts, ErrorFallsWithTheParameterAndStaysUnderIt) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 10000);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {});
+  double last_error = 1;
+  uint64_t last_rays = 0;
+  for (const auto& [error, limit] : {std::pair{"0.1", 0.1}, {"0.02", 0.02}, {"0.004", 0.004}}) {
+    const auto frame = test::render(*scene, "lightcuts", vpls, {{"error", error}});
+    const double measured = test::mean_relative_error(frame.radiance, reference.radiance);
+    // Each cluster may err by `error`; those of many clusters have either sign, and their sum stays about as small.
+    EXPECT_LT(measured, 1.25 * limit) << error;
+    EXPECT_LT(measured, last_error);
+    EXPECT_GT(frame.counters.rays, last_rays);
+    last_error = measured, last_rays = frame.counters.rays;
+  }
+  EXPECT_LT(last_rays, reference.counters.rays) << "a cut is cheaper than all lights";
+}
+
+TEST(Lightcuts, EveryLightTreeAndSeveralRepresentativesHoldTheError) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 5000);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {});
+  for (const char* tree : {"agglomerative", "divisive_3d", "divisive_6d"})
+    for (const char* representatives : {"1", "8"}) {
+      const auto frame =
+          test::render(*scene, "lightcuts", vpls, {{"tree", tree}, {"representatives", representatives}});
+      EXPECT_LT(test::mean_relative_error(frame.radiance, reference.radiance), 0.02) << tree << " " << representatives;
+    }
+}
+
+TEST(Lightcuts, LargestCutIsKept) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 5000);
+  const auto frame = test::render(*scene, "lightcuts", vpls, {{"error", "0"}, {"max_cut", "40"}});
+  // A refinement adds one cluster to a cut below the limit; both children of the last one count.
+  for (float cut : frame.cut_size) EXPECT_LE(cut, 41.0f);
+}
+
+TEST(Lightcuts, SameImageOnOneAndFourThreads) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 3000);
+  const auto one = test::render(*scene, "lightcuts", vpls, {}, 64, 48, 2, 1),
+             four = test::render(*scene, "lightcuts", vpls, {}, 64, 48, 2, 4);
+  EXPECT_EQ(std::memcmp(one.radiance.data(), four.radiance.data(), one.radiance.size() * sizeof(Rgb)), 0);
+}
+
+TEST(Lightcuts, ImageDoesNotDependOnTheScaleOfTheScene) {
+  // Scales that are powers of two round alike; the lamps' radiance stays, so the image does.
+  const auto image = [](float scale) {
+    const auto scene = test::make_room(scale);
+    return test::render(*scene, "lightcuts", test::lights_of(*scene, 3000), {}).radiance;
+  };
+  const auto unit = image(1.0f);
+  for (float scale : {1.0f / 1024, 1024.0f}) EXPECT_LT(test::rmse_over_mean(image(scale), unit), 1e-5) << scale;
+  // Others round otherwise, and a path or a cut may turn: still the same picture.
+  for (float scale : {0.001f, 1000.0f}) EXPECT_LT(test::rmse_over_mean(image(scale), unit), 0.05) << scale;
+}
+
+TEST(Lightcuts, DegenerateLightsAreNoTrouble) {
+  const auto scene = test::make_room();
+  for (const char* id : {"exhaustive", "lightcuts"}) {
+    VplSet one;
+    one.lights.resize(1);
+    one.lights[0].position = {0, -0.5f, 0.8f};
+    one.lights[0].intensity = {1, 1, 1};
+    const auto single = test::render(*scene, id, one, {}, 16, 16);
+    VplSet many;
+    many.lights.assign(20000, one.lights[0]);
+    for (Vpl& v : many.lights) v.intensity = {1 / 20000.0f, 1 / 20000.0f, 1 / 20000.0f};
+    const auto coincident = test::render(*scene, id, many, {}, 16, 16);
+    // 20,000 single-precision summands: up to 1e-4 of rounding.
+    EXPECT_LT(test::mean_relative_error(coincident.radiance, single.radiance), 1e-3) << id;
+    EXPECT_GT(
+        test::mean_relative_error(single.radiance, std::vector<Rgb>(single.radiance.size(), Rgb{1e-6f, 1e-6f, 1e-6f})),
+        1.0)
+        << "it is lit at all";
+  }
+}
+
+}  // namespace lumicut
