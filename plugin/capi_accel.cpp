@@ -1,6 +1,7 @@
 // Level 1: rays against triangles or boxes.
 #include <cstddef>
 
+#include "accel/bvh.h"
 #include "plugin/check.h"
 #include "plugin/descriptors.h"
 #include "plugin/objects.h"
@@ -52,6 +53,12 @@ void trace(lumicut_accel_t& accel, T* rays, uint64_t count, const Fn& fn) {
   });
 }
 
+const Tree& tree_of(lumicut_accel accel, const char* caller) {
+  const Bvh* const bvh = object(accel).bvh;
+  if (bvh == nullptr) fail_unsupported(std::string(caller) + ": \"embree\" does not show its nodes");
+  return bvh->tree();
+}
+
 }  // namespace
 
 lumicut_result lumicut_accel_build(lumicut_device device, const lumicut_accel_desc* desc, lumicut_accel* accel) {
@@ -72,21 +79,41 @@ lumicut_result lumicut_accel_build(lumicut_device device, const lumicut_accel_de
 
     auto made = std::make_unique<lumicut_accel_t>();
     made->device = Ref(d);
-    copy_triangles(in, c, *made);
-    AccelGeometry geometry;
-    geometry.meshes.push_back(
-        {made->positions.data(), made->positions.size(), made->indices.data(), in.triangle_count});
-    d.arena.run([&] {
-      made->accel = make_accel(kind, geometry, {in.robust != 0, in.builder == nullptr ? "" : in.builder});
-    });
+    const AccelOptions options{in.robust != 0, in.builder == nullptr ? "" : in.builder};
+    const auto keep_bvh = [&](std::unique_ptr<Bvh> bvh) {
+      made->bvh = bvh.get();
+      made->accel = std::move(bvh);
+    };
+    if (in.box_count > 0) {
+      std::vector<Aabb> boxes(in.box_count);
+      for (uint64_t i = 0; i < in.box_count; ++i) {
+        const float* const b = in.boxes + 6 * i;
+        boxes[i] = {{b[0], b[1], b[2]}, {b[3], b[4], b[5]}};
+      }
+      d.arena.run([&] { keep_bvh(Bvh::from_boxes(boxes, options, nullptr, true)); });
+    } else {
+      copy_triangles(in, c, *made);
+      AccelGeometry geometry;
+      geometry.meshes.push_back(
+          {made->positions.data(), made->positions.size(), made->indices.data(), in.triangle_count});
+      d.arena.run([&] {
+        if (kind == "agglomerative")
+          keep_bvh(Bvh::from_geometry(geometry, options, nullptr, true));
+        else
+          made->accel = make_accel(kind, geometry, options);
+      });
+      if (made->bvh != nullptr) made->positions = {}, made->indices = {};  // it keeps triangles of its own
+    }
     *accel = made.release();
   });
 }
 
 lumicut_result lumicut_accel_get_info(lumicut_accel accel, lumicut_accel_info* info) {
   return guard([&] {
-    const AccelInfo i = object(accel).accel->info();
+    const lumicut_accel_t& a = object(accel);
+    const AccelInfo i = a.accel->info();
     lumicut_accel_info out{};
+    out.node_count = a.bvh == nullptr ? 0 : static_cast<uint32_t>(a.bvh->tree().nodes.size());
     out.primitive_count = i.triangles;
     out.bytes = i.bytes;
     out.build_seconds = i.build_seconds;
@@ -98,17 +125,29 @@ lumicut_result lumicut_accel_get_info(lumicut_accel accel, lumicut_accel_info* i
   });
 }
 
-lumicut_result lumicut_accel_get_node(lumicut_accel accel, uint32_t, lumicut_accel_node_info*) {
+lumicut_result lumicut_accel_get_node(lumicut_accel accel, uint32_t index, lumicut_accel_node_info* node) {
   return guard([&] {
-    object(accel);
-    fail_unsupported("lumicut_accel_get_node: this kind does not show its nodes");
+    const std::vector<TreeNode>& nodes = tree_of(accel, "lumicut_accel_get_node").nodes;
+    if (index >= nodes.size())
+      fail_argument("lumicut_accel_get_node: index " + number_text(uint64_t{index}) + " is out of range: there are " +
+                    number_text(uint64_t{nodes.size()}) + " nodes");
+    const TreeNode& n = nodes[index];
+    lumicut_accel_node_info out{};
+    out.left = n.leaf() ? LUMICUT_NO_ID : n.first;
+    out.right = n.leaf() ? LUMICUT_NO_ID : n.first + 1;
+    out.first = n.leaf() ? n.first : 0;
+    out.count = n.count;
+    for (int k = 0; k < 3; ++k) out.lower[k] = n.lo[k], out.upper[k] = n.hi[k];
+    write(node, out);
   });
 }
 
-lumicut_result lumicut_accel_get_primitives(lumicut_accel accel, const uint32_t**, uint64_t*) {
+lumicut_result lumicut_accel_get_primitives(lumicut_accel accel, const uint32_t** ids, uint64_t* count) {
   return guard([&] {
-    object(accel);
-    fail_unsupported("lumicut_accel_get_primitives: this kind does not show its nodes");
+    const std::vector<uint32_t>& prims = tree_of(accel, "lumicut_accel_get_primitives").prims;
+    if (ids == nullptr || count == nullptr) fail_argument("lumicut_accel_get_primitives: ids or count is NULL");
+    *ids = prims.data();
+    *count = prims.size();
   });
 }
 

@@ -20,6 +20,8 @@
 
 namespace lumicut {
 
+class Bvh;
+
 // Long work of one object, seen from other threads: status and cancel.
 class Work {
  public:
@@ -65,8 +67,8 @@ uint64_t resident_memory();
 struct Prepared {
   Ref<lumicut_scene_t> scene;
   uint64_t scene_version = 0;
-  std::string params_key, vpls_key;  // the parameters it was made with: all, those of light tracing
-  uint64_t host_lights = 0;          // which of the host's sets; 0: traced
+  std::string params_key, vpls_key;    // the parameters it was made with: all, those of light tracing
+  uint64_t host_lights = 0;            // which of the host's sets; 0: traced
   std::shared_ptr<const VplSet> vpls;  // as traced, or as the host gave them
   VplSet standing_off;                 // the same, off their surfaces: what the method shades with
   std::optional<Params> params;
@@ -91,6 +93,7 @@ struct lumicut_accel_t : lumicut::ObjectOf<lumicut_accel_t> {
   std::vector<lumicut::Vec3f> positions;
   std::vector<uint32_t> indices;
   std::unique_ptr<lumicut::Accel> accel;
+  const lumicut::Bvh* bvh = nullptr;  // `accel`, where it is ours
   std::string stats_text;
 };
 

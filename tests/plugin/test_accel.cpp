@@ -39,10 +39,14 @@ std::vector<lumicut_rayhit> random_rays(size_t n) {
   return rays;
 }
 
-TEST(Accel, HitsAreThoseOfTryingEveryTriangle) {
+class AccelKinds : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Accel, AccelKinds, testing::Values("embree", "agglomerative"),
+                         [](const auto& each) { return std::string(each.param); });
+
+TEST_P(AccelKinds, HitsAreThoseOfTryingEveryTriangle) {
   const api::Device device(2);
   const Geometry g = geometry();
-  const api::Accel accel(device, desc_of(g));
+  const api::Accel accel(device, desc_of(g, GetParam()));
   // More than one batch of the library's, so that its own threads take part.
   auto rays = random_rays(20000), expected = rays;
   accel.intersect(rays.data(), rays.size());
@@ -67,10 +71,10 @@ TEST(Accel, HitsAreThoseOfTryingEveryTriangle) {
     ASSERT_EQ(occluded[i].tfar == -INFINITY, rays[i].hit.geom_id != LUMICUT_NO_ID) << i;
 }
 
-TEST(Accel, AnswersDoNotDependOnTheSizeOfTheBatch) {
+TEST_P(AccelKinds, AnswersDoNotDependOnTheSizeOfTheBatch) {
   const api::Device device(2);
   const Geometry g = geometry();
-  const api::Accel accel(device, desc_of(g));
+  const api::Accel accel(device, desc_of(g, GetParam()));
   auto whole = random_rays(9000), parts = whole;
   accel.intersect(whole.data(), whole.size());
   for (size_t i = 0; i < parts.size(); i += 7) accel.intersect(parts.data() + i, std::min<size_t>(7, parts.size() - i));
@@ -80,7 +84,7 @@ TEST(Accel, AnswersDoNotDependOnTheSizeOfTheBatch) {
   }
 }
 
-TEST(Accel, PositionsMayLieInLongerRecords) {
+TEST_P(AccelKinds, PositionsMayLieInLongerRecords) {
   struct Vertex {
     float position[3], normal[3], uv[2];
   };
@@ -88,10 +92,10 @@ TEST(Accel, PositionsMayLieInLongerRecords) {
   const Geometry g = geometry();
   std::vector<Vertex> vertices(g.positions.size() / 3);
   for (size_t i = 0; i < vertices.size(); ++i) std::copy_n(&g.positions[3 * i], 3, vertices[i].position);
-  auto d = desc_of(g);
+  auto d = desc_of(g, GetParam());
   d.positions = vertices[0].position;
   d.position_stride = sizeof(Vertex);
-  const api::Accel strided(device, d), packed(device, desc_of(g));
+  const api::Accel strided(device, d), packed(device, desc_of(g, GetParam()));
   vertices.assign(vertices.size(), Vertex{});  // inputs are copied
   auto a = random_rays(1000), b = a;
   strided.intersect(a.data(), a.size());
@@ -99,24 +103,80 @@ TEST(Accel, PositionsMayLieInLongerRecords) {
   for (size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].ray.tfar, b[i].ray.tfar);
 }
 
-TEST(Accel, TellsItsBoundsAndCounts) {
+TEST_P(AccelKinds, TellsItsBoundsAndCounts) {
   const api::Device device(1);
   const Geometry g = geometry();
-  const auto info = api::Accel(device, desc_of(g)).info();
+  const auto info = api::Accel(device, desc_of(g, GetParam())).info();
   EXPECT_EQ(info.primitive_count, g.indices.size() / 3);
   EXPECT_FLOAT_EQ(info.lower[0], -1);
   EXPECT_FLOAT_EQ(info.upper[1], 1);
   EXPECT_FLOAT_EQ(info.lower[2], -2);
 }
 
-TEST(Accel, WithoutTrianglesNothingIsHit) {
+TEST_P(AccelKinds, WithoutTrianglesNothingIsHit) {
   const api::Device device(1);
   auto d = make<lumicut_accel_desc>();
-  d.kind = "embree";
+  d.kind = GetParam();
   const api::Accel accel(device, d);
   auto rays = random_rays(10);
   accel.intersect(rays.data(), rays.size());
   for (const auto& r : rays) EXPECT_EQ(r.hit.geom_id, LUMICUT_NO_ID);
+}
+
+TEST(Accel, TheBinaryTreeOfTheDefaultKindCanBeWalked) {
+  const api::Device device(1);
+  const Geometry g = geometry();
+  const api::Accel accel(device, desc_of(g, nullptr));
+  const auto info = accel.info();
+  const size_t triangles = g.indices.size() / 3;
+  EXPECT_EQ(info.node_count, 2 * triangles - 1);
+  EXPECT_GT(info.expected_cost, 0);
+  const uint32_t* ids = nullptr;
+  uint64_t count = 0;
+  ASSERT_EQ(lumicut_accel_get_primitives(accel.get(), &ids, &count), LUMICUT_OK);
+  ASSERT_EQ(count, triangles);
+  std::vector<int> seen(triangles, 0);
+  std::vector<uint32_t> stack{0};
+  while (!stack.empty()) {
+    const auto n = accel.node(stack.back());
+    stack.pop_back();
+    if (n.left == LUMICUT_NO_ID) {
+      for (uint32_t i = n.first; i < n.first + n.count; ++i) ++seen[ids[i]];
+      continue;
+    }
+    for (const uint32_t child : {n.left, n.right}) {
+      const auto c = accel.node(child);
+      for (int k = 0; k < 3; ++k) {
+        EXPECT_GE(c.lower[k], n.lower[k]);
+        EXPECT_LE(c.upper[k], n.upper[k]);
+      }
+      stack.push_back(child);
+    }
+  }
+  EXPECT_EQ(seen, std::vector<int>(triangles, 1)) << "each triangle lies in one leaf";
+  auto node = make<lumicut_accel_node_info>();
+  EXPECT_CODE(lumicut_accel_get_node(accel.get(), info.node_count, &node), LUMICUT_INVALID_ARGUMENT, "is out of range");
+}
+
+TEST(Accel, RaysHitBoxesWhereTheyEnter) {
+  const api::Device device(1);
+  const float boxes[12] = {0, 0, 0, 1, 1, 1, 3, 0, 0, 4, 1, 1};
+  auto d = make<lumicut_accel_desc>();
+  d.boxes = boxes, d.box_count = 2;
+  const api::Accel accel(device, d);
+  EXPECT_EQ(accel.info().primitive_count, 2u);
+  lumicut_rayhit rays[3] = {};
+  const float origins[3][3] = {{-2, 0.5f, 0.5f}, {2, 0.5f, 0.5f}, {-2, 5, 0.5f}};
+  for (int i = 0; i < 3; ++i) {
+    rays[i].ray = {origins[i][0], origins[i][1], origins[i][2], 0, 1, 0, 0, 0, INFINITY, 0xffffffffu, 0, 0};
+    rays[i].hit.geom_id = LUMICUT_NO_ID;
+  }
+  accel.intersect(rays, 3);
+  EXPECT_EQ(rays[0].hit.prim_id, 0u);
+  EXPECT_FLOAT_EQ(rays[0].ray.tfar, 2);
+  EXPECT_EQ(rays[1].hit.prim_id, 1u);
+  EXPECT_FLOAT_EQ(rays[1].ray.tfar, 1);
+  EXPECT_EQ(rays[2].hit.geom_id, LUMICUT_NO_ID);
 }
 
 TEST(Accel, WrongDescriptorsAreRefused) {
@@ -140,6 +200,13 @@ TEST(Accel, WrongDescriptorsAreRefused) {
   const float box[6] = {0, 0, 0, 1, 1, 1};
   d = make<lumicut_accel_desc>(), d.kind = "embree", d.boxes = box, d.box_count = 1;
   refused(d, LUMICUT_UNSUPPORTED, "lumicut_accel_desc.boxes");
+  d = desc_of(g, nullptr), d.builder = "magic";
+  refused(d, LUMICUT_INVALID_ARGUMENT, "magic");
+  const float inverted[6] = {1, 1, 1, 0, 0, 0};
+  d = make<lumicut_accel_desc>(), d.boxes = inverted, d.box_count = 1;
+  refused(d, LUMICUT_INVALID_ARGUMENT, "box 0 is inverted");
+  d = desc_of(g, nullptr), d.boxes = box, d.box_count = 1;
+  refused(d, LUMICUT_INVALID_ARGUMENT, "beside triangles");
   const api::Accel good(device, desc_of(g));
   EXPECT_CODE(lumicut_accel_intersect(good.get(), nullptr, 5), LUMICUT_INVALID_ARGUMENT, "count is 5");
   auto node = make<lumicut_accel_node_info>();
