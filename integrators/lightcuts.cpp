@@ -18,6 +18,9 @@ namespace {
 
 constexpr uint32_t kAll = (1u << kLanes) - 1;
 
+// Share of the `error` parameter that one cluster may use, so that the mean error of an image stays below the parameter.
+constexpr float kClusterShare = 0.75f;
+
 // A cluster in the cuts of the points in `active`.
 struct alignas(64) CutEntry {
   float bound[kLanes];
@@ -58,7 +61,7 @@ class Lightcuts final : public Integrator {
     scene_ = &scene;
     const float clamp = clamp_distance(params, scene);
     clamp2_ = clamp * clamp;
-    error_ = static_cast<float>(params.real("error"));
+    error_ = kClusterShare * static_cast<float>(params.real("error"));
     const auto limit = params.integer("max_cut");
     max_cut_ = limit == 0 ? std::numeric_limits<uint32_t>::max() : static_cast<uint32_t>(limit);
     seed_ = static_cast<uint64_t>(params.integer("seed"));
@@ -215,7 +218,7 @@ class Lightcuts final : public Integrator {
 
 std::vector<ParamInfo> params() {
   return {
-      {"error", "Error", "Largest error of each cluster, as a share of the point's radiance", "of the radiance",
+      {"error", "Error", "Error to stay under, as a share of the point's radiance; bounds each cluster", "of the radiance",
        ParamType::real, "0.02", 0, 1},
       {"max_cut", "Largest cut", "Most clusters a point may use; 0: no limit", "clusters", ParamType::integer, "0", 0,
        1e9},
