@@ -1,0 +1,208 @@
+// Hitting sets for disks on the rows of the thesis's Table 7.1 that can be generated, beside greedy, dnet and an
+// integer-programming solver (COIN-OR CBC, when its command is installed) on the reduced instance.
+//
+//   bench_hitting_set            the table
+//   bench_hitting_set scale      dnet to a million points, and the memory-bounded path
+//   bench_hitting_set <n>        the table with n seconds for each integer program (default 60)
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "bench_util.h"
+#include "geometry/hitting_instance.h"
+#include "geometry/hitting_set.h"
+#include "point_sets.h"
+#ifdef LUMICUT_HAS_CGAL
+#include "geometry/dnet.h"
+#endif
+
+namespace lumicut::bench {
+namespace {
+
+struct Case {
+  const char* points;
+  size_t n;
+  const char*
+      kind;  // RND: random disks, radius uniform in [0, r], those without points dropped; FIX: one around each point
+  size_t disks;
+  double r;
+};
+
+std::vector<Disk> make_disks(const Case& c, const std::vector<Point2>& p) {
+  std::vector<Disk> disks;
+  if (!std::strcmp(c.kind, "FIX")) {
+    for (const Point2& q : p) disks.push_back({q, c.r});
+    return disks;
+  }
+  Rng rng(2, Stage::test, c.disks);
+  const PointTree tree(p);
+  for (size_t i = 0; i < c.disks; ++i) {
+    Disk d;
+    d.centre.x = uniform01(rng), d.centre.y = uniform01(rng), d.radius = c.r * uniform01(rng);
+    if (tree.count_in(d) > 0) disks.push_back(d);
+  }
+  return disks;
+}
+
+struct Proof {
+  double bound = 0, value = 0;
+  bool optimal = false, ran = false;
+  double seconds = 0;
+};
+
+// min sum x over the kernel's disks, by the cbc command.
+Proof integer_program(const hitting::Instance& in, int seconds) {
+  Proof proof;
+  const std::string base = "/tmp/lumicut_cbc_" + std::to_string(getpid());
+  {
+    std::ofstream lp(base + ".lp");
+    lp << "Minimize\n obj:";
+    for (size_t p = 0; p < in.point_id.size(); ++p) lp << (p % 20 ? " + x" : "\n + x") << p;
+    lp << "\nSubject To\n";
+    for (size_t d = 0; d < in.disk_id.size(); ++d) {
+      lp << " c" << d << ":";
+      size_t k = 0;
+      for (const uint32_t p : in.points_of[d]) lp << (k++ % 20 == 19 ? "\n + x" : " + x") << p;
+      lp << " >= 1\n";
+    }
+    lp << "Binary\n";
+    for (size_t p = 0; p < in.point_id.size(); ++p) lp << " x" << p << "\n";
+    lp << "End\n";
+  }
+  const std::string command =
+      "cbc " + base + ".lp sec " + std::to_string(seconds) + " solve > " + base + ".log 2>/dev/null";
+  proof.ran = std::system(command.c_str()) == 0;
+  std::string line;
+  for (std::ifstream log(base + ".log"); std::getline(log, line);) {
+    if (line.find("Optimal solution found") != std::string::npos) proof.optimal = true;
+    if (line.rfind("Objective value:", 0) == 0) proof.value = std::atof(line.c_str() + 16);
+    if (line.rfind("Lower bound:", 0) == 0) proof.bound = std::atof(line.c_str() + 12);
+    if (line.rfind("Time (CPU seconds):", 0) == 0) proof.seconds = std::atof(line.c_str() + 19);
+  }
+  if (proof.optimal) proof.bound = proof.value;
+  proof.ran = proof.ran && proof.value > 0;
+  std::remove((base + ".lp").c_str());
+  std::remove((base + ".log").c_str());
+  return proof;
+}
+
+int table(int seconds) {
+  std::printf("# optimum: '=' proven by cbc on the reduced instance within %d s; else its bounds; bound: ours\n",
+              seconds);
+  std::printf("%-8s %7s %-9s %7s | %15s %7s | %7s %7s %7s %7s %7s %8s %7s | %7s %7s %7s\n", "points", "n", "disks",
+              "number", "optimum", "s", "greedy", "pruned", "k-start", "default", "bound", "x opt", "s", "dnet",
+              "x opt", "s");
+  const Case cases[] = {{"uniform", 50000, "RND", 50000, 0.1},   {"gauss9", 50000, "RND", 50000, 0.1},
+                        {"uniform", 50000, "RND", 500000, 0.01}, {"gauss9", 50000, "RND", 500000, 0.01},
+                        {"uniform", 50000, "FIX", 0, 0.001},     {"gauss9", 50000, "FIX", 0, 0.001},
+                        {"uniform", 20000, "FIX", 0, 0.01},      {"uniform", 20000, "FIX", 0, 0.02}};
+  for (const Case& c : cases) {
+    const auto p = point_set(c.points, c.n, 1);
+    const auto disks = make_disks(c, p);
+    std::vector<uint32_t> all(disks.size());
+    std::iota(all.begin(), all.end(), 0u);
+    const size_t greedy = greedy_hitting_set(p, disks, false).size(),
+                 pruned = greedy_hitting_set(p, disks, true).size();
+    HittingSet h;
+    const double s = time_of([&] { h = solve_hitting_set(p, disks); });
+    const bool valid = unhit_disks(p, disks, h.points).empty();
+    Proof proof;
+    {
+      const hitting::Kernel kernel = hitting::reduce(hitting::make_instance(PointTree(p), disks, all));
+      proof = integer_program(kernel.instance, seconds);
+    }
+    const double optimum = proof.optimal ? proof.value : std::max(proof.bound, static_cast<double>(h.lower_bound));
+    char text[64];
+    if (proof.optimal)
+      std::snprintf(text, sizeof text, "= %.0f", proof.value);
+    else
+      std::snprintf(text, sizeof text, "%.0f..%.0f", std::ceil(optimum - 1e-6), proof.value);
+    std::printf("%-8s %7zu %-3s %-5g %7zu | %15s %7.1f | %7zu %7zu %7zu %7zu %7zu %8.4f %7.2f |", c.points, c.n, c.kind,
+                c.r, disks.size(), proof.ran ? text : "no cbc", proof.seconds, greedy, pruned, h.pruned,
+                h.points.size(), h.lower_bound, static_cast<double>(h.points.size()) / optimum, s);
+#ifdef LUMICUT_HAS_CGAL
+    DnetResult d;
+    const double t = time_of([&] { d = dnet_hitting_set(p, disks); });
+    std::printf(" %7zu %7.3f %7.2f", d.points.size(), static_cast<double>(d.points.size()) / optimum, t);
+    if (!unhit_disks(p, disks, d.points).empty()) std::printf(" DNET LEAVES DISKS UNHIT");
+#endif
+    std::printf("%s\n", valid ? "" : " LEAVES DISKS UNHIT");
+    std::fflush(stdout);
+  }
+  return 0;
+}
+
+// Runs fn in a process of its own, so that peak memory is its own.
+template <typename Fn>
+void apart(Fn&& fn) {
+  std::fflush(stdout);
+  const pid_t child = fork();
+  if (child == 0) {
+    fn();
+    std::fflush(stdout);
+    _exit(0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+}
+
+int scale() {
+  std::printf("%-44s %9s %9s %9s %9s %9s\n", "instance", "set", "bound", "seconds", "us/(n+m)", "peak MB");
+#ifdef LUMICUT_HAS_CGAL
+  for (const size_t n : {62500, 125000, 250000, 500000, 1000000})
+    apart([&] {
+      const Case c{"uniform", n, "RND", n, 0.1 * std::sqrt(50000.0 / static_cast<double>(n))};
+      const auto p = point_set(c.points, n, 1);
+      const auto disks = make_disks(c, p);
+      DnetResult d;
+      DnetOptions o;
+      o.net.mode = EpsilonNetOptions::Mode::thesis;  // larger nets, and ten times as fast
+      const double s = time_of([&] { d = dnet_hitting_set(p, disks, o); });
+      std::printf("dnet  %7zu points %7zu disks RND %-8.4f %9zu %9s %9.2f %9.2f %9.0f\n", n, disks.size(), c.r,
+                  d.points.size(), "-", s, 1e6 * s / static_cast<double>(n + disks.size()), peak_megabytes());
+    });
+#endif
+  for (const bool bounded : {false, true})
+    apart([&] {
+      const Case c{"uniform", 400000, "FIX", 0, bounded ? 0.058 : 0.003};
+      const auto p = point_set(c.points, c.n, 1);
+      const auto disks = make_disks(c, p);
+      HittingSetOptions o;
+      o.max_incidences = bounded ? size_t{1} << 24 : size_t{1} << 27;
+      HittingSet h;
+      const double s = time_of([&] { h = solve_hitting_set(p, disks, o); });
+      std::printf("%-8s 400000 points and disks FIX %-11.3f %9zu %9zu %9.2f %9.2f %9.0f%s\n",
+                  bounded ? "bounded" : "default", c.r, h.points.size(), h.lower_bound, s, 1e6 * s / 8e5,
+                  peak_megabytes(), unhit_disks(p, disks, h.points).empty() ? "" : " LEAVES DISKS UNHIT");
+    });
+#ifdef LUMICUT_HAS_CGAL
+  apart([&] {
+    const Case c{"uniform", 400000, "FIX", 0, 0.058};
+    const auto p = point_set(c.points, c.n, 1);
+    const auto disks = make_disks(c, p);
+    DnetResult d;
+    DnetOptions o;
+    o.net.mode = EpsilonNetOptions::Mode::thesis;
+    const double s = time_of([&] { d = dnet_hitting_set(p, disks, o); });
+    std::printf("dnet     400000 points and disks FIX %-11.3f %9zu %9s %9.2f %9.2f %9.0f\n", c.r, d.points.size(), "-",
+                s, 1e6 * s / 8e5, peak_megabytes());
+  });
+#endif
+  return 0;
+}
+
+}  // namespace
+}  // namespace lumicut::bench
+
+int main(int argc, char** argv) {
+  lumicut::bench::print_header("Hitting sets for disks", argc, argv, 1);
+  if (argc > 1 && !std::strcmp(argv[1], "scale")) return lumicut::bench::scale();
+  return lumicut::bench::table(argc > 1 ? std::max(1, std::atoi(argv[1])) : 60);
+}

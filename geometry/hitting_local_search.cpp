@@ -1,0 +1,193 @@
+// (k, k-1) local search on a reduced instance. [thesis ch. 8]
+//
+// Departs: rather than the pseudo-disk structures of sec. 8.3, triples are enumerated along links: two points of the
+// set are linked when some point y shares a disk with each of them, where both disks are hit by at most three points of
+// the set. An improving (3,2) move that contains no improving (2,1) or (1,0) move is connected by links: its two new
+// points each share a disk to be taken over with some of the three, and if those groups were apart, one group alone
+// would be an improving move.
+#include <algorithm>
+
+#include "geometry/hitting_instance.h"
+
+namespace lumicut::hitting {
+namespace {
+
+class Search {
+ public:
+  Search(const Instance& in, int k, Solution& s)
+      : in_(in),
+        k_(k),
+        s_(s),
+        hits_(in.disk_id.size(), 0),
+        disk_stamp_(in.disk_id.size(), 0),
+        disk_seen_(in.disk_id.size(), 0),
+        point_stamp_(s.size(), 0),
+        queued_(s.size(), 0) {
+    for (uint32_t p = 0; p < s_.size(); ++p)
+      if (s_[p])
+        for (const uint32_t d : in_.disks_of[p]) ++hits_[d];
+  }
+
+  void run() {
+    for (uint32_t p = 0; p < s_.size(); ++p)
+      if (s_[p]) enqueue(p);
+    for (size_t i = 0; i < queue_.size(); ++i) {
+      const uint32_t x = queue_[i];
+      queued_[x] = 0;
+      // Moves free others nearby: those are queued again by apply().
+      while (s_[x] && improve_around(x)) {
+      }
+    }
+  }
+
+ private:
+  void enqueue(uint32_t p) {
+    if (queued_[p]) return;
+    queued_[p] = 1;
+    queue_.push_back(p);
+  }
+
+  // Points of the set that share a rarely hit disk with y (at most k hits).
+  template <typename Fn>
+  void owners(uint32_t y, Fn&& fn) const {
+    for (const uint32_t d : in_.disks_of[y]) {
+      if (hits_[d] > static_cast<uint32_t>(k_)) continue;
+      for (const uint32_t x : in_.points_of[d])
+        if (s_[x]) fn(x);
+    }
+  }
+  void links(uint32_t x, std::vector<uint32_t>& out) {
+    out.clear();
+    const uint32_t mark = ++stamp_;
+    point_stamp_[x] = mark;
+    for (const uint32_t d : in_.disks_of[x]) {
+      if (hits_[d] > static_cast<uint32_t>(k_)) continue;
+      for (const uint32_t y : in_.points_of[d]) {
+        if (s_[y] || point_stamp_[y] == mark) continue;
+        point_stamp_[y] = mark;
+        owners(y, [&](uint32_t z) {
+          if (point_stamp_[z] != mark) point_stamp_[z] = mark, out.push_back(z);
+        });
+      }
+    }
+    std::sort(out.begin(), out.end());
+  }
+
+  // The disks that only points of X hit.
+  void personal(const uint32_t* x, int n, std::vector<uint32_t>& out) {
+    out.clear();
+    const uint32_t mark = ++stamp_;
+    for (int i = 0; i < n; ++i)
+      for (const uint32_t d : in_.disks_of[x[i]]) {
+        if (hits_[d] > static_cast<uint32_t>(n)) continue;
+        if (disk_stamp_[d] != mark) disk_stamp_[d] = mark, disk_seen_[d] = 0;
+        if (++disk_seen_[d] == hits_[d]) out.push_back(d);
+      }
+  }
+
+  uint32_t smallest(const std::vector<uint32_t>& disks) const {
+    return *std::min_element(disks.begin(), disks.end(), [&](uint32_t a, uint32_t b) {
+      const size_t x = in_.points_of[a].size(), y = in_.points_of[b].size();
+      return x != y ? x < y : a < b;
+    });
+  }
+  bool covers(uint32_t p, uint32_t d) const {
+    const auto list = in_.disks_of[p];
+    return std::binary_search(list.begin(), list.end(), d);
+  }
+  // A point in all of `disks`.
+  bool common_point(const std::vector<uint32_t>& disks, uint32_t& found) const {
+    for (const uint32_t p : in_.points_of[smallest(disks)])
+      if (std::all_of(disks.begin(), disks.end(), [&](uint32_t d) { return covers(p, d); })) {
+        found = p;
+        return true;
+      }
+    return false;
+  }
+
+  bool try_set(const uint32_t* x, int n) {
+    personal(x, n, own_);
+    if (own_.empty()) return apply(x, n, nullptr, 0);
+    uint32_t y[2];
+    if (n == 1) return false;
+    if (common_point(own_, y[0])) return apply(x, n, y, 1);
+    if (n < 3) return false;
+    for (const uint32_t p : in_.points_of[smallest(own_)]) {
+      rest_.clear();
+      for (const uint32_t d : own_)
+        if (!covers(p, d)) rest_.push_back(d);
+      if (rest_.empty() || !common_point(rest_, y[1])) continue;
+      y[0] = p;
+      return apply(x, n, y, 2);
+    }
+    return false;
+  }
+
+  bool apply(const uint32_t* x, int nx, const uint32_t* y, int ny) {
+    touched_.clear();
+    for (int i = 0; i < nx; ++i) {
+      s_[x[i]] = 0;
+      for (const uint32_t d : in_.disks_of[x[i]]) --hits_[d], touched_.push_back(d);
+    }
+    for (int i = 0; i < ny; ++i) {
+      if (s_[y[i]]) continue;
+      s_[y[i]] = 1;
+      enqueue(y[i]);
+      for (const uint32_t d : in_.disks_of[y[i]]) ++hits_[d], touched_.push_back(d);
+    }
+    // Whoever owns, or links to an owner of, a disk whose count changed may have a move now.
+    const uint32_t mark = ++stamp_;
+    for (const uint32_t d : touched_)
+      for (const uint32_t p : in_.points_of[d]) {
+        if (point_stamp_[p] == mark) continue;
+        point_stamp_[p] = mark;
+        if (s_[p]) enqueue(p);
+        owners(p, [&](uint32_t z) { enqueue(z); });
+      }
+    return true;
+  }
+
+  bool improve_around(uint32_t x) {
+    uint32_t set[3] = {x, 0, 0};
+    if (try_set(set, 1)) return true;
+    links(x, near_);
+    const std::vector<uint32_t> near = near_;
+    for (const uint32_t a : near) {
+      set[1] = a;
+      if (try_set(set, 2)) return true;
+    }
+    if (k_ < 3) return false;
+    // Connected triples with x in them: x in the middle, or at an end.
+    for (size_t i = 0; i < near.size(); ++i) {
+      set[1] = near[i];
+      for (size_t j = i + 1; j < near.size(); ++j) {
+        set[2] = near[j];
+        if (try_set(set, 3)) return true;
+      }
+    }
+    for (const uint32_t a : near) {
+      set[1] = a;
+      links(a, near_);
+      for (const uint32_t b : near_) {
+        if (b == x || std::binary_search(near.begin(), near.end(), b)) continue;
+        set[2] = b;
+        if (try_set(set, 3)) return true;
+      }
+    }
+    return false;
+  }
+
+  const Instance& in_;
+  const int k_;
+  Solution& s_;
+  std::vector<uint32_t> hits_, disk_stamp_, disk_seen_, point_stamp_;
+  std::vector<uint8_t> queued_;
+  std::vector<uint32_t> queue_, own_, rest_, near_, touched_;
+  uint32_t stamp_ = 0;
+};
+
+}  // namespace
+
+void local_search(const Instance& in, int k, Solution& s) { Search(in, k, s).run(); }
+
+}  // namespace lumicut::hitting

@@ -1,0 +1,60 @@
+// Small sets of points that hit every disk of a list. [Bus 2015 (thesis), ch. 5-8]
+//
+// The default solver is not the thesis's: dominance reduction, greedy, pruning, Lagrangian lower bound, and the (2,1)
+// and (3,2) local search of ch. 8, which beats the rounding algorithm (dnet.h) wherever incidence lists fit in memory.
+// Where they do not, it solves a growing sample of the disks, and adds those it misses until none is left.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "geometry/point2.h"
+
+namespace lumicut {
+
+struct HittingSetOptions {
+  bool drop_empty_disks = false;  // disks without points: false refuses them by index
+  bool local_search = true;       // (2,1) and (3,2) moves
+  int bound_iterations = 400;     // subgradient steps for the lower bound, which also steer further greedy starts
+  size_t max_incidences = size_t{1} << 27;  // (point, disk) pairs held in memory at once, 8 bytes each
+};
+
+struct HittingSet {
+  std::vector<uint32_t> points;  // indices, ascending
+  // No hitting set has fewer points than this (an integer). gap(): how far above it this one may be.
+  size_t lower_bound = 0;
+  double gap() const {
+    return points.empty() ? 0.0 : static_cast<double>(points.size()) / static_cast<double>(lower_bound) - 1.0;
+  }
+  size_t empty_disks = 0;                      // dropped
+  size_t kernel_points = 0, kernel_disks = 0;  // after dominance reduction
+  size_t greedy = 0, pruned = 0;               // sizes on the way
+  size_t solved_disks = 0;  // disks whose lists were held at last; fewer than all: memory-bounded path
+};
+
+// Throws invalid_argument on coordinates, radii that are not finite (or negative, or beyond 1e70) and, unless they are
+// to be dropped, on disks without points. Deterministic.
+HittingSet solve_hitting_set(std::span<const Point2> points, std::span<const Disk> disks,
+                             const HittingSetOptions& options = {});
+
+// The point that hits most disks still unhit, again and again; the smaller index on ties. `pruned` then drops what is
+// not needed. Lists of all incidences.
+std::vector<uint32_t> greedy_hitting_set(std::span<const Point2> points, std::span<const Disk> disks, bool pruned);
+
+// Ch. 8: replaces up to `k` points (2 or 3) of a hitting set by fewer, as long as it can. With k = 3 the result has at
+// most 8 times the optimum's points, and that is tight. [Theorem 8.1]
+// `start` must hit every disk. Found by neighbourhood enumeration on the reduced instance, not by the structures of
+// sec. 8.3 (docs/decisions/geometry-local-search.md).
+std::vector<uint32_t> improve_hitting_set(std::span<const Point2> points, std::span<const Disk> disks,
+                                          std::span<const uint32_t> start, int k);
+
+// Every disk that `set` does not hit, ascending.
+std::vector<uint32_t> unhit_disks(std::span<const Point2> points, std::span<const Disk> disks,
+                                  std::span<const uint32_t> set);
+
+// Shared with dnet.h: the argument checks above.
+void validate_hitting_instance(std::span<const Point2> points, std::span<const Disk> disks);
+
+}  // namespace lumicut
