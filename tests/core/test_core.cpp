@@ -76,7 +76,9 @@ TEST(Cone, OfADirectionBoxHoldsEveryUnitVectorInTheBox) {
     const Cone cone = cone_of_direction_box(box);
     for (const Vec3f& d : directions) EXPECT_GE(dot(d, cone.axis), cone.cos_half) << trial;
     // Narrow bundles get narrow cones: about the circumscribed circle of the box, twice the bundle at worst.
-    if (spread < 0.1f) EXPECT_GT(cone.cos_half, 1.0f - 8.0f * spread * spread - 2e-5f) << trial;
+    if (spread < 0.1f) {
+      EXPECT_GT(cone.cos_half, 1.0f - 8.0f * spread * spread - 2e-5f) << trial;
+    }
   }
   EXPECT_EQ(cone_of_direction_box(Aabb{}).cos_half, -1.0f);
   EXPECT_EQ(cone_of_direction_box(Aabb{{-1, -1, -1}, {1, 1, 1}}).cos_half, -1.0f);
