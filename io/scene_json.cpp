@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <iterator>
 #include <map>
 
 #include "io/file_error.h"
@@ -20,7 +21,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr uint64_t kMaxSceneBytes = uint64_t{1} << 30;
-constexpr double kMaxCoordinate = 1e30;  // squares of differences must stay finite... in the library's floats
+constexpr double kMaxCoordinate = 1e30;  // far beyond any scene, and sums of a few stay finite in float
 
 using Vec = std::array<double, 3>;
 
@@ -74,14 +75,18 @@ class SceneReader {
     if (auto image = root.find("image")) read_image(*image);
     read_camera(root.need("camera"));
     if (auto materials = root.find("materials")) read_materials(*materials);
-    if (auto meshes = root.find("meshes"))
-      for (const auto& mesh : meshes->elements()) read_mesh(mesh);
+    // Small things first: a misspelt key shall not wait for big meshes.
+    const auto meshes = root.find("meshes");
     if (auto lights = root.find("lights"))
       for (const auto& light : lights->elements()) read_light(light);
-    if (auto environment = root.find("environment")) read_environment(*environment);
+    const auto environment = root.find("environment");
     root.finish();
+    if (environment) read_environment(*environment);
+    if (meshes)
+      for (const auto& mesh : meshes->elements()) read_mesh(mesh);
+    std::move(lamps_.begin(), lamps_.end(), std::back_inserter(scene_.meshes));
     if (scene_.meshes.empty()) root.value().fail("has neither meshes nor visible lights: there is nothing to see");
-    check_lit(root);
+    check_lit();
     return std::move(scene_);
   }
 
@@ -549,7 +554,7 @@ class SceneReader {
       m.emission[c] = static_cast<float>(double{light.color[c]} * radiance);
     }
     mesh.materials.assign(mesh.indices.size() / 3, add_material("light " + mesh.name, m));
-    scene_.meshes.push_back(std::move(mesh));
+    lamps_.push_back(std::move(mesh));
   }
 
   void read_environment(const JsonValue& value) {
@@ -580,7 +585,7 @@ class SceneReader {
   }
 
   // A scene without light renders black, which is legal and seldom meant.
-  void check_lit(const JsonObject&) {
+  void check_lit() {
     bool lit = !scene_.lights.empty() || scene_.environment.has_value();
     for (const auto& m : scene_.materials)
       lit = lit || m.values.emission[0] + m.values.emission[1] + m.values.emission[2] > 0;
@@ -591,6 +596,7 @@ class SceneReader {
   SceneData scene_;
   TextureStore textures_;
   std::map<std::string, uint32_t> by_name_;
+  std::vector<Mesh> lamps_;  // visible lights: after all other meshes
   bool z_up_ = false;
   double scale_ = 1;
 };

@@ -311,6 +311,26 @@ TEST(SceneJson, EnvironmentsThatAreNotFiniteNameThePixel) {
   EXPECT_EQ(data.environment->texture, 1);
 }
 
+TEST(SceneJson, ScenesOfTheBenchesAreWellFormed) {
+  // Their meshes are not part of the project: one triangle stands in for each.
+  const TemporaryFolder folder;
+  for (const char* name : {"conference", "sponza", "sibenik", "kitchen"}) {
+    folder.write(std::string(name) + "/m.mtl", "newmtl floor\nKd 0.5 0.5 0.5\nKe 1 1 1\n");
+    folder.write(std::string(name) + "/" + name + ".obj",
+                 "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl floor\nf 1 2 3\n");
+  }
+  folder.write("envmaps/venice_sunset_1k.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n\x80\x80\x80\x81");
+  setenv("LUMICUT_SCENES", (folder / ".").c_str(), 1);
+  const char* root = std::getenv("LUMICUT_SOURCE_DIR");
+  ASSERT_NE(root, nullptr) << "set by CTest";
+  for (const char* name : {"conference", "conference_peer", "sponza", "sibenik", "kitchen"}) {
+    const SceneData scene = read_scene(std::string(root) + "/bench/scenes/" + name + ".json");
+    EXPECT_EQ(scene.width, 512u);
+    EXPECT_EQ(scene.meshes.size(), std::string(name) == "conference_peer" ? 22u : 1u) << "21 visible lamps";
+  }
+  unsetenv("LUMICUT_SCENES");
+}
+
 TEST(SceneJson, ASceneWithoutLightWarns) {
   const SceneData scene = changed([](json& s) { s.erase("lights"); });
   ASSERT_EQ(scene.warnings.size(), 1u);
