@@ -64,7 +64,8 @@ Built build_meshes(const AccelGeometry& geometry, std::span<const uint32_t> mesh
         const Vec3f rows[3] = {t.v0, robust ? t.v1 : t.v1 - t.v0, robust ? t.v2 : t.v2 - t.v0};
         for (int k = 0; k < 3; ++k)
           for (int axis = 0; axis < 3; ++axis) block.v[k][axis][lane] = rows[k][axis];
-        block.prim[lane] = primitives[i].prim, block.geom[lane] = primitives[i].mesh, block.mask[lane] = mesh.mask;
+        block.prim[lane] = primitives[i].prim, block.geom[lane] = primitives[i].mesh;
+        block.extent[lane] = max_component(boxes[i].extent());
       },
       progress);
   if (number_through)
@@ -97,12 +98,14 @@ std::unique_ptr<Bvh> Bvh::from_geometry(const AccelGeometry& geometry, const Acc
   bool filters = false;
   for (const MeshView& mesh : geometry.meshes) {
     bvh->has_cutout_.push_back(mesh.has_cutout ? 1 : 0);
+    bvh->mesh_masks_.push_back(mesh.mask);
     filters |= mesh.has_cutout;
     bvh->scene_.masks |= mesh.mask != 0xffffffffu;
   }
   bvh->scene_.robust = options.robust;
   bvh->scene_.filter = filters ? geometry.filter : nullptr;
   bvh->scene_.has_cutout = bvh->has_cutout_.data();
+  bvh->scene_.mesh_masks = bvh->mesh_masks_.data();
   AccelInfo& info = bvh->info_;
   if (geometry.instances.empty()) {
     std::vector<uint32_t> all(geometry.meshes.size());
@@ -188,7 +191,7 @@ std::unique_ptr<Bvh> Bvh::from_boxes(std::span<const Aabb> boxes, const AccelOpt
       [&](LeafBlock& block, int lane, uint32_t i) {
         for (int axis = 0; axis < 3; ++axis)
           block.v[0][axis][lane] = boxes[i].lo[axis], block.v[1][axis][lane] = boxes[i].hi[axis];
-        block.prim[lane] = i, block.geom[lane] = 0, block.mask[lane] = 0xffffffffu;
+        block.prim[lane] = i, block.geom[lane] = 0;
       },
       progress);
   bvh->scene_.boxes = true;

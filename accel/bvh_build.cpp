@@ -7,8 +7,9 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
-#include <cstdio>
+#include <cstring>
 #include <numeric>
 
 #include "accel/agglomerate.h"
@@ -520,17 +521,21 @@ BuildOptions build_options_of(const std::string& text) {
   for (const auto& [n, builder] : kNames)
     if (name == n) options.builder = builder, known = true;
   if (plus != std::string::npos && known) {
+    // "reinsert", "reinsert:P" or "reinsert:PxN", digits and a point alone.
     const std::string rest = text.substr(plus + 1);
     float percent = 20.0f;
-    int passes = 8, used = 0;
-    if (rest == "reinsert") {
-      used = static_cast<int>(rest.size());
-    } else if (std::sscanf(rest.c_str(), "reinsert:%fx%d%n", &percent, &passes, &used) < 2) {
-      passes = 8;
-      if (std::sscanf(rest.c_str(), "reinsert:%f%n", &percent, &used) < 1) used = 0;
+    int passes = 8;
+    if (rest != "reinsert") {
+      const char *at = rest.data() + std::min(rest.size(), std::strlen("reinsert:")), *end = rest.data() + rest.size();
+      known = rest.rfind("reinsert:", 0) == 0;
+      const auto share = std::from_chars(at, end, percent, std::chars_format::fixed);
+      known = known && share.ec == std::errc();
+      if (known && share.ptr != end) {
+        const auto count = std::from_chars(share.ptr + 1, end, passes);
+        known = *share.ptr == 'x' && count.ec == std::errc() && count.ptr == end;
+      }
     }
-    known =
-        used == static_cast<int>(rest.size()) && percent > 0.0f && percent <= 100.0f && passes > 0 && passes <= 1000;
+    known = known && percent > 0.0f && percent <= 100.0f && passes > 0 && passes <= 1000;
     options.reinsert_share = percent / 100.0f;
     options.reinsert_passes = passes;
   }

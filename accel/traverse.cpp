@@ -92,12 +92,21 @@ struct Slabs {
   }
 };
 
+// An edge test is off by no more than this, times the direction, the triangle's extent and its distance: a dozen
+// roundings. Where a ray meets a corner all tests around it are noise, and without slack all triangles may say no
+// (Embree's may).
+constexpr float kEdgeSlack = 4.0f * kUlp;
+// Triangles seen so edge-on are left to their neighbours: all their tests are noise.
+constexpr float kEdgeOn = 1e-6f;
+
 // A ray against the four primitives of a block.
 struct LaneRay {
   V4 o[3], d[3];
+  V4 slack;  // robust: of an edge test, per extent and distance
   HWY_INLINE LaneRay(const Vec3f& org, const Vec3f& dir) {
     const D4 tag;
     for (int axis = 0; axis < 3; ++axis) o[axis] = hn::Set(tag, org[axis]), d[axis] = hn::Set(tag, dir[axis]);
+    slack = hn::Set(tag, kEdgeSlack * max_component(max(dir, -dir)));
   }
 };
 struct Lanes4 {
@@ -148,6 +157,13 @@ HWY_INLINE void edge4(const V4* p, const V4* q, V4* out) {
   cross4(e, s, out);
 }
 
+HWY_INLINE V4 norm1(const V4* a) { return hn::Add(hn::Abs(a[0]), hn::Add(hn::Abs(a[1]), hn::Abs(a[2]))); }
+// Extent times distance, of triangles whose first corner lies at `a` from the origin.
+HWY_INLINE V4 edge_reach(const LeafBlock& block, size_t i, const V4* a) {
+  const V4 extent = hn::Load(D4(), block.extent + i);
+  return hn::Mul(extent, hn::Add(extent, hn::Max(hn::Abs(a[0]), hn::Max(hn::Abs(a[1]), hn::Abs(a[2])))));
+}
+
 template <bool kWhere>
 HWY_INLINE uint32_t hit_triangles_robust(const LeafBlock& block, size_t i, const LaneRay& r, const V4& tnear,
                                          const V4& tfar, Lanes4& where) {
@@ -160,21 +176,23 @@ HWY_INLINE uint32_t hit_triangles_robust(const LeafBlock& block, size_t i, const
   }
   edge4(c, a, cross_u), edge4(a, b, cross_v), edge4(b, c, cross_w);
   const V4 u = dot4(cross_u, r.d), v = dot4(cross_v, r.d), w = dot4(cross_w, r.d);
-  const V4 sum = hn::Add(hn::Add(u, v), w), slack = hn::Mul(hn::Abs(sum), hn::Set(d, kUlp));
+  const V4 slack = hn::Mul(r.slack, edge_reach(block, i, a));
   auto hit = hn::Or(hn::Ge(hn::Min(u, hn::Min(v, w)), hn::Neg(slack)), hn::Le(hn::Max(u, hn::Max(v, w)), slack));
   if (hn::AllFalse(d, hit)) return 0;
   V4 e1[3], e2[3], ng[3];
   for (int axis = 0; axis < 3; ++axis) e1[axis] = hn::Sub(b[axis], a[axis]), e2[axis] = hn::Sub(c[axis], a[axis]);
   cross4(e1, e2, ng);
   const V4 den = dot4(ng, r.d), t = hn::Div(dot4(ng, a), den);
-  hit = hn::And(hit, hn::And(hn::And(hn::Gt(t, tnear), hn::Lt(t, tfar)), hn::Ne(den, hn::Zero(d))));
+  const V4 edge_on = hn::Mul(hn::Mul(r.slack, hn::Set(d, kEdgeOn / kEdgeSlack)), norm1(ng));
+  hit = hn::And(hit, hn::And(hn::And(hn::Gt(t, tnear), hn::Lt(t, tfar)), hn::Gt(hn::Abs(den), edge_on)));
   if constexpr (kWhere) {
+    const V4 sum = hn::Add(hn::Add(u, v), w);
     // The sum vanishes where the ray lies in the triangle's plane.
     const V4 rcp = hn::IfThenElse(hn::Ne(sum, hn::Zero(d)), hn::Div(hn::Set(d, 1.0f), sum), hn::Zero(d)),
              one = hn::Set(d, 1.0f);
     hn::Store(t, d, where.t + i);
-    hn::Store(hn::Min(hn::Mul(u, rcp), one), d, where.u + i);
-    hn::Store(hn::Min(hn::Mul(v, rcp), one), d, where.v + i);
+    hn::Store(hn::Max(hn::Min(hn::Mul(u, rcp), one), hn::Zero(d)), d, where.u + i);
+    hn::Store(hn::Max(hn::Min(hn::Mul(v, rcp), one), hn::Zero(d)), d, where.v + i);
   }
   return bits_of(d, hit);
 }
@@ -200,8 +218,8 @@ HWY_INLINE uint32_t hit_boxes(const LeafBlock& block, size_t i, const LaneRay& r
 }
 
 template <class C, bool kWhere>
-HWY_INLINE uint32_t hit_block(const LeafBlock& block, const LaneRay& r, const V4& tnear, const V4& tfar, uint32_t mask,
-                              Lanes4& where) {
+HWY_INLINE uint32_t hit_block(const TraceScene& scene, const LeafBlock& block, const LaneRay& r, const V4& tnear,
+                              const V4& tfar, uint32_t mask, Lanes4& where) {
   uint32_t all = 0;
   for (size_t i = 0; i < 4; i += hn::Lanes(D4())) {  // once, but where there are no vectors of four
     uint32_t hit;
@@ -211,12 +229,14 @@ HWY_INLINE uint32_t hit_block(const LeafBlock& block, const LaneRay& r, const V4
       hit = hit_triangles_robust<kWhere>(block, i, r, tnear, tfar, where);
     else
       hit = hit_triangles_fast<kWhere>(block, i, r, tnear, tfar, where);
-    if constexpr (C::kMasks) {
-      const D4u d;
-      if (hit != 0) hit &= bits_of(d, hn::Ne(hn::And(hn::Load(d, block.mask + i), hn::Set(d, mask)), hn::Zero(d)));
-    }
     all |= hit << i;
   }
+  (void)scene, (void)mask;
+  if constexpr (C::kMasks)
+    for (uint32_t m = all; m != 0; m &= m - 1) {
+      const int lane = __builtin_ctz(m);
+      if ((scene.mesh_masks[block.geom[lane]] & mask) == 0) all &= ~(1u << lane);
+    }
   return all;
 }
 
@@ -275,7 +295,7 @@ HWY_NOINLINE bool any_hit(const TraceScene& scene, const WideBvh& bvh, uint32_t 
     } else {
       const LeafBlock& block = bvh.leaves[current & ~kLeafBit];
       Lanes4 where;
-      uint32_t hit = hit_block<C, C::kFilters>(block, lanes, tnear4, tfar4, r.mask, where);
+      uint32_t hit = hit_block<C, C::kFilters>(scene, block, lanes, tnear4, tfar4, r.mask, where);
       if constexpr (C::kFilters) {
         for (; hit != 0; hit &= hit - 1) {
           const int lane = __builtin_ctz(hit);
@@ -363,7 +383,7 @@ HWY_NOINLINE void closest_hit(const TraceScene& scene, const WideBvh& bvh, uint3
       } else {
         const LeafBlock& block = bvh.leaves[current & ~kLeafBit];
         Lanes4 where;
-        uint32_t hit = hit_block<C, true>(block, lanes, tnear4, tfar4, r.ray.mask, where);
+        uint32_t hit = hit_block<C, true>(scene, block, lanes, tnear4, tfar4, r.ray.mask, where);
         if (hit != 0) {
           const float *t = where.t, *u = where.u, *v = where.v;
           bool nearer = false;
@@ -442,6 +462,9 @@ class BundleTracer {
       negative_[axis] = sign_hi < 0.0f;
     }
     any_mixed_ = mixed_[0] || mixed_[1] || mixed_[2];
+    if constexpr (!kSun && C::kRobust)
+      for (uint64_t m = b_.active; m != 0; m &= m - 1)
+        for (int axis = 0; axis < 3; ++axis) reach_ = std::max(reach_, std::abs(b_.d[axis][__builtin_ctzll(m)]));
   }
 
   // Rays that hit something.
@@ -589,8 +612,8 @@ class BundleTracer {
   HWY_INLINE bool stops(const LeafBlock& block, const Ray& r) const {
     const D4 d4;
     Lanes4 where;
-    uint32_t hit =
-        hit_block<C, C::kFilters>(block, LaneRay(r.org, r.dir), hn::Zero(d4), hn::Set(d4, r.tfar), r.mask, where);
+    uint32_t hit = hit_block<C, C::kFilters>(scene_, block, LaneRay(r.org, r.dir), hn::Zero(d4), hn::Set(d4, r.tfar),
+                                             r.mask, where);
     if constexpr (C::kFilters) {
       for (; hit != 0; hit &= hit - 1) {
         const int lane = __builtin_ctz(hit);
@@ -604,7 +627,7 @@ class BundleTracer {
   }
 
   struct Rows {  // of four triangles: vectors whose dot product with a direction is wanted
-    HWY_ALIGN float x[3][4], y[3][4], z[3][4], n[3][4], t[4];
+    HWY_ALIGN float x[3][4], y[3][4], z[3][4], n[3][4], t[4], reach[4], norm[4];
   };
   HWY_INLINE static void store(const V4* from, float (*to)[4], size_t i) {
     for (int axis = 0; axis < 3; ++axis) hn::Store(from[axis], D4(), to[axis] + i);
@@ -658,16 +681,19 @@ class BundleTracer {
       edge4(b, c, row), store(row, rows.z, i);
       cross4(e1, e2, row), store(row, rows.n, i);
       hn::Store(dot4(row, a), d4, rows.t + i);
+      hn::Store(hn::Mul(edge_reach(block, i, a), hn::Set(d4, kEdgeSlack * reach_)), d4, rows.reach + i);
+      hn::Store(hn::Mul(norm1(row), hn::Set(d4, kEdgeOn * reach_)), d4, rows.norm + i);
     }
     return sweep(rays, block, [&](int lane, const VN* dir) HWY_ATTR {
       const DN d;
       const VN u = dot_dir(rows.x, lane, dir), v = dot_dir(rows.y, lane, dir), w = dot_dir(rows.z, lane, dir);
-      const VN sum = hn::Add(hn::Add(u, v), w), slack = hn::Mul(hn::Abs(sum), hn::Set(d, kUlp));
+      const VN slack = hn::Set(d, rows.reach[lane]);
       const auto inside =
           hn::Or(hn::Ge(hn::Min(u, hn::Min(v, w)), hn::Neg(slack)), hn::Le(hn::Max(u, hn::Max(v, w)), slack));
       const VN den = dot_dir(rows.n, lane, dir), sign = hn::And(den, hn::SignBit(d)), abs_den = hn::Xor(den, sign);
       const VN t = hn::Xor(hn::Set(d, rows.t[lane]), sign);
-      return hn::And(inside, hn::And(hn::Gt(t, hn::Zero(d)), hn::Lt(t, hn::Mul(hn::Set(d, b_.tfar), abs_den))));
+      const auto between = hn::And(hn::Gt(t, hn::Zero(d)), hn::Lt(t, hn::Mul(hn::Set(d, b_.tfar), abs_den)));
+      return hn::And(inside, hn::And(between, hn::Gt(abs_den, hn::Set(d, rows.norm[lane]))));
     });
   }
 
@@ -715,6 +741,7 @@ class BundleTracer {
   const TraceScene& scene_;
   const Bundle& b_;
   float lo_[3], hi_[3], common_r_[3];
+  float reach_ = 0.0f;  // the greatest component of a direction
   bool mixed_[3], negative_[3], any_mixed_;
 };
 

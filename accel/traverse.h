@@ -18,7 +18,8 @@ struct TraceScene {
   const WideBvh* top = nullptr;  // over primitives, or over instances
   std::span<const Instance> instances;
   const HitFilter* filter = nullptr;
-  const uint8_t* has_cutout = nullptr;  // by mesh
+  const uint8_t* has_cutout = nullptr;   // by mesh
+  const uint32_t* mesh_masks = nullptr;  // by mesh
   bool robust = true;
   bool boxes = false;  // leaves hold boxes, not triangles
   bool masks = false;  // some mesh has a mask that is not all ones

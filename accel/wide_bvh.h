@@ -60,8 +60,9 @@ static_assert(sizeof(WideNode) == 256);
 
 // Four primitives side by side. Triangles: the corners, or for the fast test corner and two edges. Boxes: lo, hi.
 struct alignas(64) LeafBlock {
-  float v[3][3][4];                    // [corner][axis][lane]
-  uint32_t prim[4], geom[4], mask[4];  // prim is kNoId in lanes without a primitive
+  float v[3][3][4];           // [corner][axis][lane]
+  uint32_t prim[4], geom[4];  // prim is kNoId in lanes without a primitive
+  float extent[4];            // longest side of the triangle's box: what rounding of its edges is measured by
 };
 static_assert(sizeof(LeafBlock) == 192);
 
