@@ -1,0 +1,129 @@
+#include "geometry/ball_query_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <string>
+
+#include "core/error.h"
+
+namespace lumicut {
+
+BallQueryTree::BallQueryTree(std::span<const double> points, int dimension) : dim_(dimension) {
+  if (dimension < 1 || dimension > 1024)
+    fail_argument("ball tree: dimension is " + std::to_string(dimension) + ", not 1 to 1024");
+  const auto d = static_cast<size_t>(dimension);
+  if (points.size() % d != 0 || points.size() / d >= 0x7fffffffu)
+    fail_argument("ball tree: " + std::to_string(points.size()) + " coordinates in rows of " + std::to_string(d));
+  for (size_t i = 0; i < points.size(); ++i)
+    if (!(std::fabs(points[i]) <= 1e15))
+      fail_argument("ball tree: point " + std::to_string(i / d) + " has the coordinate " + std::to_string(points[i]));
+  const auto n = static_cast<uint32_t>(points.size() / d);
+  ids_.resize(n);
+  std::iota(ids_.begin(), ids_.end(), 0u);
+  if (n == 0) return;
+  build(points, 0, n);
+  const uint32_t buckets = (n + kBucket - 1) / kBucket;
+  padding_ = buckets * kBucket - n;
+  coords_.assign(static_cast<size_t>(buckets) * kBucket * d,
+                 std::numeric_limits<double>::infinity());  // pads are infinitely far
+  for (uint32_t i = 0; i < n; ++i)
+    for (size_t j = 0; j < d; ++j) coords_[(i / kBucket * d + j) * kBucket + i % kBucket] = points[ids_[i] * d + j];
+  ids_.resize(ids_.size() + padding_, 0xffffffffu);
+}
+
+uint32_t BallQueryTree::build(std::span<const double> points, uint32_t begin, uint32_t end) {
+  const auto d = static_cast<size_t>(dim_);
+  const auto n = static_cast<uint32_t>(nodes_.size());
+  nodes_.push_back({0, begin / kBucket, (end + kBucket - 1) / kBucket, 0});
+  const size_t at = centres_.size();
+  centres_.resize(at + d, 0.0);
+  std::vector<double> lo(d, std::numeric_limits<double>::infinity()), hi(d, -std::numeric_limits<double>::infinity());
+  for (uint32_t i = begin; i < end; ++i) {
+    const double* p = &points[ids_[i] * d];
+    for (size_t j = 0; j < d; ++j)
+      centres_[at + j] += p[j], lo[j] = std::min(lo[j], p[j]), hi[j] = std::max(hi[j], p[j]);
+  }
+  for (size_t j = 0; j < d; ++j) centres_[at + j] /= static_cast<double>(end - begin);
+  double most = 0;
+  for (uint32_t i = begin; i < end; ++i) {
+    const double* p = &points[ids_[i] * d];
+    double sum = 0;
+    for (size_t j = 0; j < d; ++j) sum += (p[j] - centres_[at + j]) * (p[j] - centres_[at + j]);
+    most = std::max(most, sum);
+  }
+  nodes_[n].radius = std::sqrt(most) * (1 + 1e-14);  // rounding of this sum and of the query's
+  if (end - begin <= kBucket) return n;
+  size_t widest = 0;
+  for (size_t j = 1; j < d; ++j)
+    if (hi[j] - lo[j] > hi[widest] - lo[widest]) widest = j;
+  // Whole buckets to the left, so that all but the last are full.
+  const uint32_t buckets = (end - begin + kBucket - 1) / kBucket, mid = begin + buckets / 2 * kBucket;
+  std::nth_element(ids_.begin() + begin, ids_.begin() + mid, ids_.begin() + end, [&](uint32_t a, uint32_t b) {
+    const double x = points[a * d + widest], y = points[b * d + widest];
+    return x < y || (x == y && a < b);
+  });
+  build(points, begin, mid);
+  const uint32_t right = build(points, mid, end);
+  nodes_[n].right = right;
+  return n;
+}
+
+size_t BallQueryTree::nearest(const double* p, size_t k, uint32_t* index, double* dist2, Scratch& scratch) const {
+  k = std::min(k, size());
+  if (k == 0) return 0;
+  const auto d = static_cast<size_t>(dim_);
+  size_t count = 0;
+  double worst = std::numeric_limits<double>::infinity(), reach = worst;  // the k-th squared distance, and its root
+  const auto to_centre = [&](uint32_t n) {
+    const double* c = &centres_[n * d];
+    double sum = 0;
+    for (size_t j = 0; j < d; ++j) sum += (p[j] - c[j]) * (p[j] - c[j]);
+    return std::sqrt(sum);
+  };
+  auto& nodes = scratch.stack_node;
+  auto& nears = scratch.stack_near;
+  nodes.assign(1, 0u);
+  nears.assign(1, 0.0);
+  while (!nodes.empty()) {
+    uint32_t n = nodes.back();
+    const double near = nears.back();
+    nodes.pop_back(), nears.pop_back();
+    if (near > reach) continue;
+    while (nodes_[n].right != 0) {
+      uint32_t a = n + 1, b = nodes_[n].right;
+      double da = to_centre(a), db = to_centre(b);
+      double na = da - nodes_[a].radius, nb = db - nodes_[b].radius;
+      // Inside both balls the nearer centre goes first.
+      if (std::max(na, 0.0) > std::max(nb, 0.0) || (na <= 0 && nb <= 0 && da > db)) std::swap(a, b), std::swap(na, nb);
+      if (nb <= reach) nodes.push_back(b), nears.push_back(nb);
+      n = a;
+      if (na > reach) break;
+    }
+    if (nodes_[n].right != 0) continue;
+    double sum[kBucket];
+    const double* rows = &coords_[nodes_[n].begin * d * kBucket];
+    for (uint32_t i = 0; i < kBucket; ++i) sum[i] = (rows[i] - p[0]) * (rows[i] - p[0]);
+    for (size_t j = 1; j < d; ++j) {
+      const double x = p[j];
+      const double* row = rows + j * kBucket;
+      for (uint32_t i = 0; i < kBucket; ++i) sum[i] += (row[i] - x) * (row[i] - x);
+    }
+    const uint32_t* ids = &ids_[nodes_[n].begin * kBucket];
+    for (uint32_t i = 0; i < kBucket; ++i) {
+      if (!(sum[i] <= worst) || ids[i] == 0xffffffffu) continue;
+      if (count == k && sum[i] == worst && ids[i] > index[k - 1]) continue;
+      // Insertion into the sorted list: k is small.
+      size_t at = count < k ? count++ : k - 1;
+      for (; at > 0 && (dist2[at - 1] > sum[i] || (dist2[at - 1] == sum[i] && index[at - 1] > ids[i])); --at)
+        dist2[at] = dist2[at - 1], index[at] = index[at - 1];
+      dist2[at] = sum[i];
+      index[at] = ids[i];
+      if (count == k) worst = dist2[k - 1], reach = std::sqrt(worst);
+    }
+  }
+  return count;
+}
+
+}  // namespace lumicut

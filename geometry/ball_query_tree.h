@@ -1,0 +1,45 @@
+// Nearest neighbours among points that do not change: a ball tree of buckets, built by median splits.
+//
+// Not from the paper: bucket leaves of sixteen, coordinate by coordinate, so that a leaf is a few vector operations.
+// Each node keeps the ball around the mean of its points.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace lumicut {
+
+class BallQueryTree {
+ public:
+  // `points`: n rows of `dimension` numbers. Throws invalid_argument as BallTree::build does.
+  BallQueryTree(std::span<const double> points, int dimension);
+
+  size_t size() const { return ids_.size() - padding_; }
+  // Reusable memory of one thread's queries.
+  struct Scratch {
+    std::vector<double> stack_near;
+    std::vector<uint32_t> stack_node;
+  };
+  // The k nearest points to `point` (`dimension` numbers), nearest first, the smaller index on ties: their indices and
+  // squared distances. Returns how many, the lesser of k and size().
+  size_t nearest(const double* point, size_t k, uint32_t* index, double* dist2, Scratch& scratch) const;
+
+ private:
+  static constexpr uint32_t kBucket = 16;
+  struct Node {
+    double radius;
+    uint32_t begin, end;  // buckets
+    uint32_t right;       // 0: leaf; the left child is the next node
+  };
+  uint32_t build(std::span<const double> points, uint32_t begin, uint32_t end);
+
+  int dim_;
+  uint32_t padding_ = 0;
+  std::vector<Node> nodes_;
+  std::vector<double> centres_;  // by node
+  std::vector<double> coords_;   // by bucket: dimension rows of sixteen
+  std::vector<uint32_t> ids_;    // by bucket
+};
+
+}  // namespace lumicut

@@ -1,0 +1,514 @@
+#include "geometry/balltree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <queue>
+#include <string>
+
+#include "accel/agglomerate.h"
+#include "core/error.h"
+
+namespace lumicut {
+
+BallTree::BallTree(int dimension) : dim_(dimension) {
+  if (dimension < 1 || dimension > 1024)
+    fail_argument("ball tree: dimension is " + std::to_string(dimension) + ", not 1 to 1024");
+}
+
+double BallTree::distance(const double* a, const double* b) const {
+  double sum = 0;
+  for (int j = 0; j < dim_; ++j) sum += (a[j] - b[j]) * (a[j] - b[j]);
+  return std::sqrt(sum);
+}
+
+double BallTree::volume(double radius) const {
+  double v = 1, base = radius;
+  for (int e = dim_; e > 0; e >>= 1, base *= base)
+    if (e & 1) v *= base;
+  return v;
+}
+
+double BallTree::joint_radius(uint32_t node, const double* c, double radius) const {
+  const double d = distance(centre(node), c), r = nodes_[node].radius;
+  if (d + radius <= r) return r;
+  if (d + r <= radius) return radius;
+  return 0.5 * (d + r + radius);
+}
+
+void BallTree::check(std::span<const double> c, double radius, const char* what) const {
+  if (c.size() != static_cast<size_t>(dim_))
+    fail_argument(std::string("ball tree: ") + what + " has " + std::to_string(c.size()) + " coordinates, not " +
+                  std::to_string(dim_));
+  for (const double x : c)
+    if (!(std::fabs(x) <= 1e15))
+      fail_argument(std::string("ball tree: ") + what + " has the coordinate " + std::to_string(x));
+  if (!(radius >= 0 && radius <= 1e15))
+    fail_argument(std::string("ball tree: ") + what + " has the radius " + std::to_string(radius));
+}
+
+uint32_t BallTree::new_node() {
+  if (!free_nodes_.empty()) {
+    const uint32_t n = free_nodes_.back();
+    free_nodes_.pop_back();
+    nodes_[n] = Node();
+    return n;
+  }
+  nodes_.emplace_back();
+  centres_.resize(centres_.size() + static_cast<size_t>(dim_));
+  return static_cast<uint32_t>(nodes_.size() - 1);
+}
+
+uint32_t BallTree::new_leaf(const double* c, double radius) {
+  const uint32_t n = new_node();
+  std::copy(c, c + dim_, centre(n));
+  nodes_[n].radius = radius;
+  uint32_t id = static_cast<uint32_t>(leaf_node_.size());
+  if (free_leaves_.empty()) {
+    leaf_node_.push_back(n);
+  } else {
+    id = free_leaves_.back();
+    free_leaves_.pop_back();
+    leaf_node_[id] = n;
+  }
+  nodes_[n].leaf = id;
+  ++leaves_;
+  return n;
+}
+
+void BallTree::fit(uint32_t n) {
+  const uint32_t a = nodes_[n].left, b = nodes_[n].right;
+  const double ra = nodes_[a].radius, rb = nodes_[b].radius;
+  const double *ca = centre(a), *cb = centre(b);
+  double* c = centre(n);
+  const double d = distance(ca, cb);
+  if (d + rb <= ra) {
+    std::copy(ca, ca + dim_, c);
+    nodes_[n].radius = ra;
+    return;
+  }
+  if (d + ra <= rb) {
+    std::copy(cb, cb + dim_, c);
+    nodes_[n].radius = rb;
+    return;
+  }
+  const double r = 0.5 * (d + ra + rb), t = (r - ra) / d;
+  double size = r;
+  for (int j = 0; j < dim_; ++j) {
+    c[j] = ca[j] + (cb[j] - ca[j]) * t;
+    size = std::max(size, std::fabs(c[j]));
+  }
+  // The centre and both distances to it round; so does the distance that a query computes.
+  nodes_[n].radius = r + 1e-15 * std::sqrt(static_cast<double>(dim_)) * 4 * size;
+}
+
+uint32_t BallTree::join(uint32_t left, uint32_t right) {
+  const uint32_t n = new_node();
+  nodes_[n].left = left;
+  nodes_[n].right = right;
+  nodes_[left].parent = nodes_[right].parent = n;
+  fit(n);
+  return n;
+}
+
+void BallTree::refit_upwards(uint32_t n) {
+  for (; n != kNone; n = nodes_[n].parent) fit(n);
+}
+
+BallTree BallTree::build(std::span<const double> centres, std::span<const double> radii, int dimension,
+                         BallTreeBuilder builder) {
+  BallTree t(dimension);
+  const auto d = static_cast<size_t>(dimension);
+  const size_t n = centres.size() / d;
+  if (n * d != centres.size() || n >= kNone / 2)
+    fail_argument("ball tree: " + std::to_string(centres.size()) + " coordinates in rows of " + std::to_string(d));
+  if (!radii.empty() && radii.size() != n)
+    fail_argument("ball tree: " + std::to_string(radii.size()) + " radii for " + std::to_string(n) + " centres");
+  for (size_t i = 0; i < n; ++i)
+    t.check(centres.subspan(i * d, d), radii.empty() ? 0.0 : radii[i], ("ball " + std::to_string(i)).c_str());
+  if (n == 0) return t;
+  t.nodes_.reserve(2 * n);
+  t.centres_.reserve(2 * n * d);
+  std::vector<uint32_t> nodes(n);
+  const bool online = builder == BallTreeBuilder::insertion || builder == BallTreeBuilder::cheap_insertion;
+  for (size_t i = 0; i < n; ++i) {
+    nodes[i] = t.new_leaf(&centres[i * d], radii.empty() ? 0.0 : radii[i]);
+    if (online)
+      t.attach(nodes[i], t.root_ == kNone                        ? kNone
+                         : builder == BallTreeBuilder::insertion ? t.best_sibling(nodes[i])
+                                                                 : t.cheap_sibling(nodes[i]));
+  }
+  if (builder == BallTreeBuilder::kd) t.root_ = t.build_kd(nodes, 0, n);
+  if (builder == BallTreeBuilder::top_down) t.root_ = t.build_top_down(nodes);
+  if (builder == BallTreeBuilder::bottom_up) t.root_ = t.build_bottom_up(centres, radii);
+  return t;
+}
+
+uint32_t BallTree::build_kd(std::vector<uint32_t>& nodes, size_t begin, size_t end) {
+  if (end - begin == 1) return nodes[begin];
+  int widest = 0;
+  double most = -1;
+  for (int j = 0; j < dim_; ++j) {
+    double lo = centre(nodes[begin])[j], hi = lo;
+    for (size_t i = begin; i < end; ++i) lo = std::min(lo, centre(nodes[i])[j]), hi = std::max(hi, centre(nodes[i])[j]);
+    if (hi - lo > most) most = hi - lo, widest = j;
+  }
+  const size_t mid = begin + (end - begin + 1) / 2;
+  const auto at = [&](size_t i) { return nodes.begin() + static_cast<std::ptrdiff_t>(i); };
+  std::nth_element(at(begin), at(mid), at(end), [&](uint32_t a, uint32_t b) {
+    const double x = centre(a)[widest], y = centre(b)[widest];
+    return x < y || (x == y && a < b);
+  });
+  const uint32_t left = build_kd(nodes, begin, mid), right = build_kd(nodes, mid, end);
+  return join(left, right);
+}
+
+uint32_t BallTree::build_top_down(std::vector<uint32_t>& nodes) {
+  // Splits first, with placeholders; then inner balls from the bottom up.
+  struct Range {
+    size_t begin, end;
+    uint32_t parent;
+    bool is_left;
+  };
+  std::vector<Range> stack{{0, nodes.size(), kNone, false}};
+  std::vector<uint32_t> created, best_order;
+  std::vector<double> cost(nodes.size()), c(static_cast<size_t>(dim_));
+  uint32_t root = kNone;
+  while (!stack.empty()) {
+    const Range r = stack.back();
+    stack.pop_back();
+    uint32_t n;
+    if (r.end - r.begin == 1) {
+      n = nodes[r.begin];
+    } else {
+      // A ball that grows over the range, from either end. [fill_in_cst]
+      double radius = 0, scale = 0;
+      const auto grow = [&](uint32_t leaf) {
+        const double* q = centre(leaf);
+        const double d = distance(c.data(), q), s = nodes_[leaf].radius;
+        if (d + s <= radius) return;
+        if (d + radius <= s) {
+          std::copy(q, q + dim_, c.begin());
+          radius = s;
+          return;
+        }
+        const double next = 0.5 * (d + radius + s), t = (next - radius) / d;
+        for (int j = 0; j < dim_; ++j) c[static_cast<size_t>(j)] += (q[j] - c[static_cast<size_t>(j)]) * t;
+        radius = next;
+      };
+      const auto start = [&](uint32_t leaf) {
+        std::copy(centre(leaf), centre(leaf) + dim_, c.begin());
+        radius = nodes_[leaf].radius;
+      };
+      start(nodes[r.begin]);
+      for (size_t i = r.begin; i < r.end; ++i) grow(nodes[i]);
+      scale = radius > 0 ? 1 / radius : 0;  // costs relative to the whole range: r^d would underflow
+      double best = std::numeric_limits<double>::infinity();
+      size_t split = r.begin + 1;
+      best_order.clear();
+      for (int j = 0; j < dim_; ++j) {
+        std::sort(nodes.begin() + static_cast<std::ptrdiff_t>(r.begin),
+                  nodes.begin() + static_cast<std::ptrdiff_t>(r.end), [&](uint32_t a, uint32_t b) {
+                    const double x = centre(a)[j], y = centre(b)[j];
+                    return x < y || (x == y && a < b);
+                  });
+        start(nodes[r.begin]);
+        for (size_t i = r.begin; i + 1 < r.end; ++i) grow(nodes[i]), cost[i] = volume(radius * scale);
+        start(nodes[r.end - 1]);
+        bool better = false;
+        for (size_t i = r.end - 1; i > r.begin; --i) {
+          grow(nodes[i]);
+          const double sum = cost[i - 1] + volume(radius * scale);
+          if (sum < best || (better && sum == best)) best = sum, split = i, better = true;
+        }
+        if (better)
+          best_order.assign(nodes.begin() + static_cast<std::ptrdiff_t>(r.begin),
+                            nodes.begin() + static_cast<std::ptrdiff_t>(r.end));
+      }
+      std::copy(best_order.begin(), best_order.end(), nodes.begin() + static_cast<std::ptrdiff_t>(r.begin));
+      n = new_node();
+      created.push_back(n);
+      stack.push_back({r.begin, split, n, true});
+      stack.push_back({split, r.end, n, false});
+    }
+    nodes_[n].parent = r.parent;
+    if (r.parent == kNone)
+      root = n;
+    else
+      (r.is_left ? nodes_[r.parent].left : nodes_[r.parent].right) = n;
+  }
+  for (size_t i = created.size(); i-- > 0;) fit(created[i]);
+  return root;
+}
+
+uint32_t BallTree::build_bottom_up(std::span<const double> centres, std::span<const double> radii) {
+  std::vector<float> c(centres.begin(), centres.end()), r(leaves_, 0.0f);
+  for (size_t i = 0; i < radii.size(); ++i) r[i] = static_cast<float>(radii[i]);
+  const auto merges = agglomerate_balls(c, r, dim_, Strategy::parallel);
+  std::vector<uint32_t> node_of(leaf_node_);
+  for (const Merge& m : merges) node_of.push_back(join(node_of[m.left], node_of[m.right]));
+  return node_of.back();
+}
+
+// The sibling that adds least volume: its joint ball with the leaf, and what its ancestors expand by. [best_sib]
+uint32_t BallTree::best_sibling(uint32_t leaf) const {
+  const double* c = centre(leaf);
+  const double radius = nodes_[leaf].radius;
+  struct Fringe {
+    double expansion, joint;
+    uint32_t node;
+  };
+  const auto later = [](const Fringe& a, const Fringe& b) {
+    return a.expansion != b.expansion ? a.expansion > b.expansion : a.node > b.node;
+  };
+  std::priority_queue<Fringe, std::vector<Fringe>, decltype(later)> fringe(later);
+  uint32_t best = root_;
+  double cost = volume(joint_radius(root_, c, radius));
+  if (nodes_[root_].leaf == kNone) fringe.push({0, cost, root_});
+  while (!fringe.empty()) {
+    const Fringe f = fringe.top();
+    fringe.pop();
+    if (f.expansion >= cost) break;
+    const double expansion = f.expansion + f.joint - volume(nodes_[f.node].radius);
+    for (const uint32_t child : {nodes_[f.node].left, nodes_[f.node].right}) {
+      const double joint = volume(joint_radius(child, c, radius));
+      if (joint + expansion < cost) cost = joint + expansion, best = child;
+      if (nodes_[child].leaf == kNone && expansion < cost) fringe.push({expansion, joint, child});
+    }
+  }
+  return best;
+}
+
+uint32_t BallTree::cheap_sibling(uint32_t leaf) const {
+  const double* c = centre(leaf);
+  const double radius = nodes_[leaf].radius;
+  uint32_t best = root_;
+  double joint = volume(joint_radius(root_, c, radius)), cost = joint, expansion = 0;
+  for (uint32_t n = root_; nodes_[n].leaf == kNone;) {
+    expansion += joint - volume(nodes_[n].radius);
+    if (expansion >= cost) break;
+    const uint32_t l = nodes_[n].left, r = nodes_[n].right;
+    const double jl = volume(joint_radius(l, c, radius)), jr = volume(joint_radius(r, c, radius));
+    if (expansion + jl <= cost) best = l, cost = expansion + jl;
+    if (expansion + jr <= cost) best = r, cost = expansion + jr;
+    const bool left = jl - volume(nodes_[l].radius) <= jr - volume(nodes_[r].radius);
+    joint = left ? jl : jr;
+    n = left ? l : r;
+  }
+  return best;
+}
+
+// Makes `leaf` the sibling of a node, under a new parent. [ins_at_node]
+void BallTree::attach(uint32_t leaf, uint32_t sibling) {
+  if (sibling == kNone) {
+    root_ = leaf;
+    return;
+  }
+  const uint32_t above = nodes_[sibling].parent;
+  const uint32_t parent = join(sibling, leaf);
+  nodes_[parent].parent = above;
+  if (above == kNone)
+    root_ = parent;
+  else
+    (nodes_[above].left == sibling ? nodes_[above].left : nodes_[above].right) = parent;
+  refit_upwards(above);
+}
+
+uint32_t BallTree::insert(std::span<const double> c, double radius, bool cheap) {
+  check(c, radius, "the new ball");
+  const uint32_t leaf = new_leaf(c.data(), radius);
+  attach(leaf, root_ == kNone ? kNone : cheap ? cheap_sibling(leaf) : best_sibling(leaf));
+  return nodes_[leaf].leaf;
+}
+
+void BallTree::remove(uint32_t id) {
+  if (id >= leaf_node_.size() || leaf_node_[id] == kNone)
+    fail_argument("ball tree: no leaf " + std::to_string(id) + " to remove");
+  const uint32_t leaf = leaf_node_[id], parent = nodes_[leaf].parent;
+  leaf_node_[id] = kNone;
+  free_leaves_.push_back(id);
+  free_nodes_.push_back(leaf);
+  --leaves_;
+  if (parent == kNone) {
+    root_ = kNone;
+    return;
+  }
+  const uint32_t sibling = nodes_[parent].left == leaf ? nodes_[parent].right : nodes_[parent].left;
+  const uint32_t above = nodes_[parent].parent;
+  free_nodes_.push_back(parent);
+  nodes_[sibling].parent = above;
+  if (above == kNone)
+    root_ = sibling;
+  else
+    (nodes_[above].left == parent ? nodes_[above].left : nodes_[above].right) = sibling;
+  refit_upwards(above);
+}
+
+double BallTree::total_volume() const {
+  double sum = 0;
+  std::vector<uint32_t> stack;
+  if (root_ != kNone) stack.push_back(root_);
+  while (!stack.empty()) {
+    const Node& n = nodes_[stack.back()];
+    stack.pop_back();
+    if (n.leaf != kNone) continue;
+    sum += volume(n.radius);
+    stack.push_back(n.left);
+    stack.push_back(n.right);
+  }
+  return sum;
+}
+
+size_t BallTree::depth() const {
+  size_t deepest = 0;
+  std::vector<std::pair<uint32_t, size_t>> stack;
+  if (root_ != kNone) stack.push_back({root_, 1});
+  while (!stack.empty()) {
+    const auto [n, level] = stack.back();
+    stack.pop_back();
+    deepest = std::max(deepest, level);
+    if (nodes_[n].leaf == kNone)
+      stack.push_back({nodes_[n].left, level + 1}), stack.push_back({nodes_[n].right, level + 1});
+  }
+  return deepest;
+}
+
+std::vector<uint32_t> BallTree::containing(std::span<const double> c, double radius) const {
+  check(c, radius, "the query");
+  std::vector<uint32_t> found, stack;
+  if (root_ != kNone) stack.push_back(root_);
+  while (!stack.empty()) {
+    const uint32_t i = stack.back();
+    const Node& n = nodes_[i];
+    stack.pop_back();
+    if (distance(centre(i), c.data()) + radius > n.radius) continue;
+    if (n.leaf != kNone)
+      found.push_back(n.leaf);
+    else
+      stack.push_back(n.left), stack.push_back(n.right);
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::vector<uint32_t> BallTree::intersecting(std::span<const double> c, double radius) const {
+  check(c, radius, "the query");
+  std::vector<uint32_t> found, stack;
+  if (root_ != kNone) stack.push_back(root_);
+  while (!stack.empty()) {
+    const uint32_t i = stack.back();
+    const Node& n = nodes_[i];
+    stack.pop_back();
+    if (distance(centre(i), c.data()) > radius + n.radius) continue;
+    if (n.leaf != kNone)
+      found.push_back(n.leaf);
+    else
+      stack.push_back(n.left), stack.push_back(n.right);
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::vector<uint32_t> BallTree::contained(std::span<const double> c, double radius) const {
+  check(c, radius, "the query");
+  std::vector<uint32_t> found, stack;
+  if (root_ != kNone) stack.push_back(root_);
+  while (!stack.empty()) {
+    const uint32_t i = stack.back();
+    const Node& n = nodes_[i];
+    stack.pop_back();
+    const double d = distance(centre(i), c.data());
+    if (n.leaf != kNone) {
+      if (d + n.radius <= radius) found.push_back(n.leaf);
+    } else if (d <= radius + n.radius) {
+      stack.push_back(n.left), stack.push_back(n.right);
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::vector<uint32_t> BallTree::nearest(std::span<const double> p, size_t m) const {
+  check(p, 0, "the query");
+  std::vector<std::pair<double, uint32_t>> heap;  // the m best so far, worst on top
+  struct Entry {
+    double near;
+    uint32_t node;
+  };
+  std::vector<Entry> stack;
+  const auto near = [&](uint32_t n) { return distance(centre(n), p.data()) - nodes_[n].radius; };
+  if (root_ != kNone && m > 0) stack.push_back({near(root_), root_});
+  while (!stack.empty()) {
+    const Entry e = stack.back();
+    stack.pop_back();
+    const Node& n = nodes_[e.node];
+    if (n.leaf != kNone) {
+      const std::pair<double, uint32_t> candidate{distance(centre(e.node), p.data()), n.leaf};
+      if (heap.size() == m && !(candidate < heap.front())) continue;
+      heap.push_back(candidate);
+      std::push_heap(heap.begin(), heap.end());
+      if (heap.size() > m) std::pop_heap(heap.begin(), heap.end()), heap.pop_back();
+      continue;
+    }
+    if (heap.size() == m && e.near > heap.front().first) continue;
+    Entry a{near(n.left), n.left}, b{near(n.right), n.right};
+    if (a.near < b.near) std::swap(a, b);
+    stack.push_back(a);
+    stack.push_back(b);  // the nearer one first
+  }
+  std::sort_heap(heap.begin(), heap.end());
+  std::vector<uint32_t> ids;
+  for (const auto& h : heap) ids.push_back(h.second);
+  return ids;
+}
+
+uint32_t BallTree::best_mate(std::span<const double> c, double radius, uint32_t except) const {
+  check(c, radius, "the query");
+  // No leaf in a node gives a smaller joint ball than the node's point nearest to the query would.
+  const auto bound = [&](uint32_t n) {
+    const double near = std::max(0.0, distance(centre(n), c.data()) - nodes_[n].radius);
+    return std::max(radius, 0.5 * (near + radius));
+  };
+  std::pair<double, uint32_t> best{std::numeric_limits<double>::infinity(), kNone};
+  std::vector<uint32_t> stack;
+  if (root_ != kNone) stack.push_back(root_);
+  while (!stack.empty()) {
+    const uint32_t i = stack.back();
+    const Node& n = nodes_[i];
+    stack.pop_back();
+    if (n.leaf != kNone) {
+      if (n.leaf != except) best = std::min(best, {joint_radius(i, c.data(), radius), n.leaf});
+      continue;
+    }
+    if (bound(i) > best.first) continue;
+    const bool left_last = bound(n.left) <= bound(n.right);
+    stack.push_back(left_last ? n.right : n.left);
+    stack.push_back(left_last ? n.left : n.right);
+  }
+  return best.second;
+}
+
+bool BallTree::valid() const {
+  size_t seen = 0;
+  std::vector<uint32_t> stack;
+  if (root_ != kNone) stack.push_back(root_);
+  if (root_ != kNone && nodes_[root_].parent != kNone) return false;
+  while (!stack.empty()) {
+    const uint32_t i = stack.back();
+    const Node& n = nodes_[i];
+    stack.pop_back();
+    if (n.leaf != kNone) {
+      if (leaf_node_[n.leaf] != i) return false;
+      ++seen;
+      continue;
+    }
+    for (const uint32_t child : {n.left, n.right}) {
+      if (nodes_[child].parent != i) return false;
+      if (distance(centre(i), centre(child)) + nodes_[child].radius > n.radius * (1 + 1e-15)) return false;
+      stack.push_back(child);
+    }
+  }
+  return seen == leaves_;
+}
+
+}  // namespace lumicut

@@ -1,0 +1,89 @@
+// Ball trees: binary trees over balls in any dimension, every node bounded by a ball. [Omohundro 1989]
+//
+// Departs: bottom-up goes through accel/agglomerate.h (the same greedy pairs as the paper's brute force) on
+// single-precision leaves; volumes are compared by radius where one decides alone, and r^d appears in sums only;
+// top-down takes an explicit stack, for its depth can be near N; balls of inner nodes are widened by a few roundings,
+// so that pruning never loses a leaf.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace lumicut {
+
+enum class BallTreeBuilder {
+  kd,               // median of the widest dimension: balanced
+  top_down,         // the split, over all dimensions, of least joint volume
+  insertion,        // on-line, best sibling by branch and bound (not exact for balls: the paper says so)
+  cheap_insertion,  // on-line, into the child that expands less
+  bottom_up         // greedy pairs of least joint ball; dimension at most 16
+};
+
+class BallTree {
+ public:
+  static constexpr uint32_t kNone = 0xffffffffu;
+
+  // Throws invalid_argument on a dimension outside 1 to 1024.
+  explicit BallTree(int dimension);
+  // `centres`: n rows of `dimension` numbers; `radii`: n numbers, or empty for points. Leaf i is ball i.
+  // Throws invalid_argument on sizes that do not fit, values that are not finite or beyond 1e15, radii below 0.
+  static BallTree build(std::span<const double> centres, std::span<const double> radii, int dimension,
+                        BallTreeBuilder builder);
+
+  // On-line use. Returns the new leaf's id; ids of removed leaves are used again.
+  uint32_t insert(std::span<const double> centre, double radius, bool cheap = false);
+  // Throws invalid_argument when there is no such leaf.
+  void remove(uint32_t leaf);
+
+  size_t size() const { return leaves_; }
+  int dimension() const { return dim_; }
+  // Sum of radius^d over inner nodes: the paper's measure of a tree (proportional to volume).
+  double total_volume() const;
+  size_t depth() const;
+
+  // Leaves, ascending. Balls are closed.
+  std::vector<uint32_t> containing(std::span<const double> centre, double radius) const;    // that hold the ball wholly
+  std::vector<uint32_t> intersecting(std::span<const double> centre, double radius) const;  // that touch it
+  std::vector<uint32_t> contained(std::span<const double> centre, double radius) const;     // wholly inside it
+  // The m leaves whose centres are nearest to the point, nearest first, the smaller id on ties.
+  std::vector<uint32_t> nearest(std::span<const double> point, size_t m) const;
+  // The leaf (other than `except`) whose joint ball with the given one is smallest; kNone when there is none.
+  uint32_t best_mate(std::span<const double> centre, double radius, uint32_t except = kNone) const;
+
+  // Every inner ball holds its children, parents and children agree, leaves are all reached. For tests and debugging.
+  bool valid() const;
+
+ private:
+  struct Node {
+    double radius = 0;
+    uint32_t left = kNone, right = kNone, parent = kNone;
+    uint32_t leaf = kNone;  // leaf id; kNone: inner
+  };
+  const double* centre(uint32_t node) const { return &centres_[static_cast<size_t>(node) * static_cast<size_t>(dim_)]; }
+  double* centre(uint32_t node) { return &centres_[static_cast<size_t>(node) * static_cast<size_t>(dim_)]; }
+  double distance(const double* a, const double* b) const;
+  double volume(double radius) const;
+  double joint_radius(uint32_t node, const double* centre, double radius) const;
+  void check(std::span<const double> centre, double radius, const char* what) const;
+  uint32_t new_node();
+  uint32_t new_leaf(const double* centre, double radius);
+  uint32_t join(uint32_t left, uint32_t right);  // a new inner node
+  void fit(uint32_t node);                       // its ball around its children's
+  void refit_upwards(uint32_t node);
+  uint32_t best_sibling(uint32_t leaf) const;
+  uint32_t cheap_sibling(uint32_t leaf) const;
+  void attach(uint32_t leaf, uint32_t sibling);
+  uint32_t build_kd(std::vector<uint32_t>& nodes, size_t begin, size_t end);
+  uint32_t build_top_down(std::vector<uint32_t>& nodes);
+  uint32_t build_bottom_up(std::span<const double> centres, std::span<const double> radii);
+
+  int dim_;
+  uint32_t root_ = kNone;
+  size_t leaves_ = 0;
+  std::vector<Node> nodes_;
+  std::vector<double> centres_;
+  std::vector<uint32_t> leaf_node_, free_nodes_, free_leaves_;
+};
+
+}  // namespace lumicut
