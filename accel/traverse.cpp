@@ -6,6 +6,12 @@
 // bundle by interval arithmetic before single rays are tested.
 #include "accel/traverse.h"
 
+// Under sanitizers each instruction set takes minutes to compile: one, and the fallback.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#undef HWY_DISABLED_TARGETS
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3)
+#endif
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "accel/traverse.cpp"
 #include <hwy/foreach_target.h>
@@ -359,17 +365,15 @@ HWY_NOINLINE void closest_hit(const TraceScene& scene, const WideBvh& bvh, uint3
         if constexpr (!C::kInstances) prefetch(bvh, current);
         continue;
       }
-      // The farthest at the bottom.
-      const int bottom = top;
-      const auto insert = [&](int lane) {
-        const Waiting w{node.child[lane], entry[lane]};
-        int i = top++;
-        for (; i > bottom && stack[i - 1].entry < w.entry; --i) stack[i] = stack[i - 1];
-        stack[i] = w;
-      };
-      insert(nearest), insert(second);
-      for (; mask != 0; mask &= mask - 1) insert(__builtin_ctz(mask));
-      current = stack[--top].child;
+      // The nearest next, the rest in any order: a full sort costs more than it saves.
+      if (entry[second] < entry[nearest]) std::swap(nearest, second);
+      stack[top++] = {node.child[second], entry[second]};
+      for (; mask != 0; mask &= mask - 1) {
+        int lane = __builtin_ctz(mask);
+        if (entry[lane] < entry[nearest]) std::swap(lane, nearest);
+        stack[top++] = {node.child[lane], entry[lane]};
+      }
+      current = node.child[nearest];
       if constexpr (!C::kInstances) prefetch(bvh, current);
     }
     if (!missed) {
