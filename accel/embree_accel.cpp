@@ -113,30 +113,42 @@ class EmbreeAccel final : public Accel {
   void occluded_from_point(const Vec3f& light, bool directional, const float* px, const float* py, const float* pz,
                            size_t n, uint8_t* out) const override {
     embree::Context context(true);
-    constexpr size_t kChunk = embree::kHasStreams ? 64 : 16;
-    for (size_t begin = 0; begin < n; begin += kChunk) {
-      const size_t count = std::min(kChunk, n - begin);
-      Packet<kChunk> packet;
-      for (size_t i = 0; i < kChunk; ++i) {
-        const size_t at = begin + std::min(i, count - 1);
-        const Vec3f p{px[at], py[at], pz[at]};
-        const Vec3f org = directional ? p : light, dir = directional ? light : p - light;
-        const float sum = (org.x + org.y + org.z) * 0.0f + (dir.x + dir.y + dir.z) * 0.0f;
-        const bool active = i < count && sum == 0.0f;
-        packet.org_x[i] = org.x, packet.org_y[i] = org.y, packet.org_z[i] = org.z;
-        packet.dir_x[i] = active ? dir.x : 1.0f, packet.dir_y[i] = active ? dir.y : 0.0f,
-        packet.dir_z[i] = active ? dir.z : 0.0f;
-        packet.tnear[i] = active ? 0.0f : std::numeric_limits<float>::infinity();
-        packet.tfar[i] = !active ? -std::numeric_limits<float>::infinity()
-                                 : (directional ? std::numeric_limits<float>::infinity() : 0x1.fffffep-1f);
-        packet.time[i] = 0.0f;
-        packet.mask[i] = 0xffffffffu, packet.id[i] = 0, packet.flags[i] = 0;
-        packet.valid[i] = active ? -1 : 0;
+    constexpr size_t kWidth = 16;
+    Packet<kWidth> packet;
+    const bool sound = (light.x + light.y + light.z) * 0.0f == 0.0f;
+    // What all rays share is written once: Embree changes tfar alone.
+    for (size_t i = 0; i < kWidth; ++i) {
+      packet.org_x[i] = packet.dir_x[i] = light.x;
+      packet.org_y[i] = packet.dir_y[i] = light.y;
+      packet.org_z[i] = packet.dir_z[i] = light.z;
+      packet.tnear[i] = packet.time[i] = 0.0f;
+      packet.mask[i] = 0xffffffffu, packet.id[i] = packet.flags[i] = 0;
+    }
+    const float reach = directional ? std::numeric_limits<float>::infinity() : 0x1.fffffep-1f;
+    for (size_t begin = 0; begin < n; begin += kWidth) {
+      const size_t count = std::min(kWidth, n - begin);
+      alignas(64) float x[kWidth], y[kWidth], z[kWidth];
+      if (count == kWidth) {
+        for (size_t i = 0; i < kWidth; ++i) x[i] = px[begin + i], y[i] = py[begin + i], z[i] = pz[begin + i];
+      } else {
+        for (size_t i = 0; i < kWidth; ++i) {
+          const size_t at = begin + std::min(i, count - 1);
+          x[i] = px[at], y[i] = py[at], z[i] = pz[at];
+        }
       }
-      if constexpr (embree::kHasStreams)
-        context.occluded_stream(scene_, reinterpret_cast<RTCRayN*>(packet.org_x), kChunk, 12 * kChunk * sizeof(float));
-      else
-        context.occluded16(packet.valid, scene_, reinterpret_cast<RTCRay16*>(packet.org_x));
+      // Zero times anything that is not finite is not zero.
+      for (size_t i = 0; i < kWidth; ++i) packet.valid[i] = (x[i] + y[i] + z[i]) * 0.0f == 0.0f ? -1 : 0;
+      for (size_t i = 0; i < kWidth; ++i) {
+        if (i >= count || !sound) packet.valid[i] = 0;
+        packet.tfar[i] = reach;
+      }
+      if (directional) {
+        for (size_t i = 0; i < kWidth; ++i) packet.org_x[i] = x[i], packet.org_y[i] = y[i], packet.org_z[i] = z[i];
+      } else {
+        for (size_t i = 0; i < kWidth; ++i)
+          packet.dir_x[i] = x[i] - light.x, packet.dir_y[i] = y[i] - light.y, packet.dir_z[i] = z[i] - light.z;
+      }
+      context.occluded16(packet.valid, scene_, reinterpret_cast<RTCRay16*>(packet.org_x));
       for (size_t i = 0; i < count; ++i)
         out[begin + i] = packet.valid[i] != 0 && packet.tfar[i] == -std::numeric_limits<float>::infinity();
     }
