@@ -6,63 +6,11 @@
 #define HWY_TARGET_INCLUDE "clusters/bounds.cpp"
 #include "hwy/foreach_target.h"  // compiles this file once a target; before highway.h
 
-#include "hwy/highway.h"
-
-#include "hwy/contrib/math/math-inl.h"
+#include "clusters/bounds-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
-
-using D = hn::CappedTag<float, kLanes>;
-using V = hn::Vec<D>;
-
-struct V3 {
-  V x, y, z;
-};
-
-HWY_INLINE V Dot(const V3& a, const V3& b) { return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, hn::Mul(a.x, b.x))); }
-HWY_INLINE V3 Load3(D d, const float (&a)[3][kLanes], size_t i) {
-  return {hn::Load(d, a[0] + i), hn::Load(d, a[1] + i), hn::Load(d, a[2] + i)};
-}
-HWY_INLINE V3 Set3(D d, const Vec3f& v) { return {hn::Set(d, v.x), hn::Set(d, v.y), hn::Set(d, v.z)}; }
-HWY_INLINE V Square(V a) { return hn::Mul(a, a); }
-
-// Largest extent of the box with half sizes `half` along the unit vector `a`.
-HWY_INLINE V Reach(const V3& a, const V3& half) { return Dot({hn::Abs(a.x), hn::Abs(a.y), hn::Abs(a.z)}, half); }
-
-// Largest cosine that a vector of a box can make with the z axis, from the box's centre and half sizes in a frame whose
-// z is the axis: the highest z over the least distance from the axis (below the horizon: the largest).
-HWY_INLINE V LargestCosine(D d, V x, V y, V z, V half_x, V half_y, V half_z) {
-  const V zero = hn::Zero(d);
-  const V top = hn::Add(z, half_z);
-  const V ax = hn::Abs(x), ay = hn::Abs(y);
-  const V near2 = hn::MulAdd(Square(hn::Max(zero, hn::Sub(ax, half_x))), hn::Set(d, 1.0f),
-                             Square(hn::Max(zero, hn::Sub(ay, half_y))));
-  const V far2 = hn::Add(Square(hn::Add(ax, half_x)), Square(hn::Add(ay, half_y)));
-  const V side2 = hn::IfThenElse(hn::Ge(top, zero), near2, far2);
-  const V norm2 = hn::Add(Square(top), side2);
-  // A box around the origin holds every direction. Near the horizon cosines cancel: an absolute slack for their
-  // rounding.
-  const V cosine = hn::IfThenElse(hn::Gt(norm2, hn::Set(d, 1e-30f)),
-                                  hn::Div(top, hn::Sqrt(hn::Max(norm2, hn::Set(d, 1e-30f)))), hn::Set(d, 1.0f));
-  return hn::Add(cosine, hn::Set(d, 2e-6f));
-}
-
-// Cosine of (angle − half-angle), at least 0 degrees: the best any direction of the cone can do.
-HWY_INLINE V WidenByCone(D d, V cosine, V cos_half, V sin_half) {
-  const V one = hn::Set(d, 1.0f);
-  const V sine = hn::Sqrt(hn::Max(hn::Zero(d), hn::NegMulAdd(cosine, cosine, one)));
-  const V wide = hn::Add(hn::MulAdd(cosine, cos_half, hn::Mul(sine, sin_half)), hn::Set(d, 2e-6f));
-  return hn::IfThenElse(hn::Ge(cosine, cos_half), one, wide);
-}
-
-// Largest cosine between `axis` (one of each lane, with its frame) and the directions to the node's box.
-HWY_INLINE V CosineToBox(D d, const V3& to_center, const V3& half, const V3& tangent, const V3& bitangent,
-                         const V3& axis) {
-  return LargestCosine(d, Dot(to_center, tangent), Dot(to_center, bitangent), Dot(to_center, axis),
-                       Reach(tangent, half), Reach(bitangent, half), Reach(axis, half));
-}
 
 template <VplKind kKind, bool kGlossy>
 HWY_INLINE void Bounds(const LightNode& node, const PointBlock& block, float clamp2, float* HWY_RESTRICT bounds) {
@@ -110,17 +58,10 @@ HWY_INLINE void Bounds(const LightNode& node, const PointBlock& block, float cla
       else
         beta = CosineToBox(d, to_center, half, Load3(d, block.mirror_tangent, i), Load3(d, block.mirror_bitangent, i),
                            mirror);
-      // Rounding of the cosine is magnified by the exponent: a part in 10^6 of slack before it.
-      beta = hn::Min(one, hn::MulAdd(beta, hn::Set(d, 1.000001f), hn::Set(d, 1e-6f)));
-      const V base = hn::Max(beta, hn::Set(d, 1e-20f));
-      V lobe = hn::Exp(d, hn::Max(hn::Mul(hn::Load(d, block.shininess + i), hn::Log(d, base)), hn::Set(d, -80.0f)));
-      lobe = hn::IfThenElseZero(hn::Gt(beta, zero), lobe);
+      const V lobe = BoundOfLobe(d, beta, hn::Load(d, block.shininess + i));
       f = {hn::MulAdd(specular.x, lobe, f.x), hn::MulAdd(specular.y, lobe, f.y), hn::MulAdd(specular.z, lobe, f.z)};
     }
-    // Rec.709 weights, with a slack of 1e-4 for the rounding of all this.
-    const V3 weight = Set3(d, {0.2126f * 1.0001f * node.intensity.x, 0.7152f * 1.0001f * node.intensity.y,
-                               0.0722f * 1.0001f * node.intensity.z});
-    hn::StoreU(hn::Mul(geometry, Dot(f, weight)), d, bounds + i);
+    hn::StoreU(BoundOfLuminance(d, f, geometry, node.intensity), d, bounds + i);
   }
 }
 

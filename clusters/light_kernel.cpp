@@ -27,7 +27,7 @@ HWY_INLINE V3 Set3(D d, const Vec3f& v) { return {hn::Set(d, v.x), hn::Set(d, v.
 
 template <VplKind kKind, bool kGlossy>
 HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
-                        size_t count, LitPoints& lit) {
+                        size_t count, LitPoints& lit, const uint16_t* wanted) {
   const D d;
   const size_t lanes = hn::Lanes(d);
   const V zero = hn::Zero(d);
@@ -36,6 +36,14 @@ HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, co
   size_t kept = 0;
   for (size_t i = 0; i < count; i += lanes) {
     const size_t p = first + i;
+    // Points past the end are copies of the last one: they are lit too, but not kept.
+    auto inside = hn::FirstN(d, std::min(lanes, count - i));
+    if (wanted != nullptr) {
+      const uint32_t bits = static_cast<uint32_t>(wanted[i / kLanes]) >> (i % kLanes);
+      if ((bits & ((1u << lanes) - 1)) == 0) continue;
+      const uint8_t bytes[8] = {static_cast<uint8_t>(bits), static_cast<uint8_t>(bits >> 8)};
+      inside = hn::And(inside, hn::LoadMaskBits(d, bytes));
+    }
     const V3 position = Load3(d, points.position, p), normal = Load3(d, points.normal, p);
     V3 to_light;  // unit
     V geometry;
@@ -68,8 +76,6 @@ HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, co
       }
     }
     geometry = hn::Mul(geometry, hn::Max(zero, Dot(normal, to_light)));
-    // Points past the end are copies of the last one: they are lit too, but not kept.
-    const auto inside = hn::FirstN(d, std::min(lanes, count - i));
     const auto reached = hn::And(hn::Gt(geometry, zero), inside);
     if (hn::AllFalse(d, reached)) continue;
 
@@ -87,14 +93,17 @@ HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, co
     const V g = hn::Mul(hn::Mul(f.y, geometry), hn::Set(d, intensity.y));
     const V b = hn::Mul(hn::Mul(f.z, geometry), hn::Set(d, intensity.z));
     const auto keep = hn::And(reached, hn::Gt(hn::Add(r, hn::Add(g, b)), zero));
+    // Through a register: compressing into memory is microcode on Zen 4. The arrays have room for a whole vector.
     const hn::RebindToUnsigned<D> du;
-    hn::CompressStore(hn::Iota(du, static_cast<uint32_t>(i)), hn::RebindMask(du, keep), du, lit.index + kept);
-    hn::CompressStore(position.x, keep, d, lit.x + kept);
-    hn::CompressStore(position.y, keep, d, lit.y + kept);
-    hn::CompressStore(position.z, keep, d, lit.z + kept);
-    hn::CompressStore(r, keep, d, lit.r + kept);
-    hn::CompressStore(g, keep, d, lit.g + kept);
-    hn::CompressStore(b, keep, d, lit.b + kept);
+    const auto index = hn::Iota(du, static_cast<uint32_t>(i));
+    hn::StoreU(hn::Compress(index, hn::RebindMask(du, keep)), du, lit.index + kept);
+    const auto put = [&](V v, float* to) { hn::StoreU(hn::Compress(v, keep), d, to); };
+    put(position.x, lit.x + kept);
+    put(position.y, lit.y + kept);
+    put(position.z, lit.z + kept);
+    put(r, lit.r + kept);
+    put(g, lit.g + kept);
+    put(b, lit.b + kept);
     kept += hn::CountTrue(d, keep);
   }
   return kept;
@@ -102,22 +111,22 @@ HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, co
 
 template <VplKind kKind>
 HWY_INLINE size_t LightKind(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points,
-                            size_t first, size_t count, LitPoints& lit) {
-  return points.glossy() ? Light<kKind, true>(light, intensity, clamp2, points, first, count, lit)
-                         : Light<kKind, false>(light, intensity, clamp2, points, first, count, lit);
+                            size_t first, size_t count, LitPoints& lit, const uint16_t* wanted) {
+  return points.glossy() ? Light<kKind, true>(light, intensity, clamp2, points, first, count, lit, wanted)
+                         : Light<kKind, false>(light, intensity, clamp2, points, first, count, lit, wanted);
 }
 
 size_t LightPoints(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
-                   size_t count, LitPoints& lit) {
+                   size_t count, LitPoints& lit, const uint16_t* wanted) {
   switch (light.kind) {
     case VplKind::omni:
-      return LightKind<VplKind::omni>(light, intensity, clamp2, points, first, count, lit);
+      return LightKind<VplKind::omni>(light, intensity, clamp2, points, first, count, lit, wanted);
     case VplKind::oriented:
-      return LightKind<VplKind::oriented>(light, intensity, clamp2, points, first, count, lit);
+      return LightKind<VplKind::oriented>(light, intensity, clamp2, points, first, count, lit, wanted);
     case VplKind::directional:
-      return LightKind<VplKind::directional>(light, intensity, clamp2, points, first, count, lit);
+      return LightKind<VplKind::directional>(light, intensity, clamp2, points, first, count, lit, wanted);
     case VplKind::spot:
-      return LightKind<VplKind::spot>(light, intensity, clamp2, points, first, count, lit);
+      return LightKind<VplKind::spot>(light, intensity, clamp2, points, first, count, lit, wanted);
   }
   return 0;
 }
@@ -130,8 +139,8 @@ namespace lumicut {
 HWY_EXPORT(LightPoints);
 
 void light_points(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
-                  size_t count, LitPoints& lit) {
-  lit.count = HWY_DYNAMIC_DISPATCH(LightPoints)(light, intensity, clamp2, points, first, count, lit);
+                  size_t count, LitPoints& lit, const uint16_t* lanes) {
+  lit.count = HWY_DYNAMIC_DISPATCH(LightPoints)(light, intensity, clamp2, points, first, count, lit, lanes);
 }
 
 Rgb light_point(const Vpl& light, const Rgb& intensity, float clamp2, const SurfacePoint& point) {

@@ -25,8 +25,10 @@ struct LitPoints {
 // Unshadowed radiance of `light`, with the summed intensity `intensity` in place of its own, at points
 // [first, first + count) of `points`; first a multiple of kLanes, count <= kMaxLit. Only points that get any are kept,
 // in order. `clamp2`: squared distance below which no light comes nearer. [thesis Eq. 1.1 without V]
+// `lanes`, where given, holds a bit for each point (kLanes points a word, as many words as points need): only points
+// whose bit is set are kept.
 void light_points(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
-                  size_t count, LitPoints& lit);
+                  size_t count, LitPoints& lit, const uint16_t* lanes = nullptr);
 
 // Shadow rays from the light to the lit points; fills `occluded`.
 inline void trace_lit(const Accel& accel, const Vpl& light, LitPoints& lit) {

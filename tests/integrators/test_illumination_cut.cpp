@@ -1,0 +1,167 @@
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "tests/support/render.h"
+
+namespace lumicut {
+
+namespace {
+
+constexpr const char* kId = "illumination_cut";
+
+}  // namespace
+
+TEST(IlluminationCut, EqualsExhaustiveAtNoErrorWhateverItsModes) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 3000);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {});
+  for (const char* visibility : {"full", "sampling", "unbiased"})
+    for (const char* representative : {"central", "stochastic"}) {
+      const auto frame = test::render(*scene, kId, vpls,
+                                      {{"error", "0"}, {"visibility", visibility}, {"representative", representative}});
+      // Single lights are traced whole: the order of summation alone is left.
+      EXPECT_LT(test::mean_relative_error(frame.radiance, reference.radiance), 1e-5) << visibility << representative;
+    }
+}
+
+TEST(IlluminationCut, ErrorFallsWithTheParameter) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 10000);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}, 128, 96);
+  for (const char* representative : {"central", "random"}) {
+    double last_error = 1;
+    uint64_t last_rays = 0;
+    for (const auto& [error, limit] : {std::pair{"0.1", 0.1}, {"0.02", 0.02}, {"0.004", 0.005}}) {
+      const auto frame = test::render(
+          *scene, kId, vpls, {{"error", error}, {"visibility", "full"}, {"representative", representative}}, 128, 96);
+      const double measured = test::mean_relative_error(frame.radiance, reference.radiance);
+      // It bounds each pair; errors of many pairs have either sign.
+      EXPECT_LT(measured, limit) << error;
+      EXPECT_LT(measured, last_error);
+      EXPECT_GT(frame.counters.rays, last_rays);
+      last_error = measured, last_rays = frame.counters.rays;
+    }
+    EXPECT_LT(last_rays, reference.counters.rays);
+  }
+}
+
+TEST(IlluminationCut, SampledVisibilityTracesFewerRaysForLittleMoreError) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 2000);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}, 256, 192);
+  const auto full = test::render(*scene, kId, vpls, {{"visibility", "full"}}, 256, 192),
+             sampled = test::render(*scene, kId, vpls, {{"visibility", "sampling"}}, 256, 192);
+  EXPECT_LT(sampled.counters.rays, full.counters.rays * 2 / 3);
+  EXPECT_LT(test::mean_relative_error(sampled.radiance, reference.radiance),
+            test::mean_relative_error(full.radiance, reference.radiance) + 0.005);
+}
+
+TEST(IlluminationCut, UnbiasedModesAreRightOnAverage) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 2000);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}, 64, 48);
+  constexpr int kRuns = 24;
+  const auto mean_of = [&](int runs, int first_seed) {
+    std::vector<Rgb> mean(reference.radiance.size());
+    for (int run = 0; run < runs; ++run) {
+      const auto frame = test::render(*scene, kId, vpls,
+                                      {{"error", "0.1"},
+                                       {"visibility", "unbiased"},
+                                       {"representative", "stochastic"},
+                                       {"seed", std::to_string(first_seed + run)}},
+                                      64, 48);
+      for (size_t i = 0; i < mean.size(); ++i) mean[i] += frame.radiance[i] * (1.0f / static_cast<float>(runs));
+    }
+    return mean;
+  };
+  const double single = test::rmse_over_mean(mean_of(1, 1), reference.radiance),
+               many = test::rmse_over_mean(mean_of(kRuns, 1), reference.radiance);
+  // Noise falls with the root of 24 = 4.9; a bias would stay.
+  EXPECT_LT(many, single / 3.5);
+}
+
+TEST(IlluminationCut, SameImageOnOneAndFourThreads) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 3000);
+  for (const char* visibility : {"sampling", "unbiased"}) {
+    const test::Settings settings = {{"visibility", visibility}};
+    const auto one = test::render(*scene, kId, vpls, settings, 96, 80, 2, 1),
+               four = test::render(*scene, kId, vpls, settings, 96, 80, 2, 4);
+    EXPECT_EQ(std::memcmp(one.radiance.data(), four.radiance.data(), one.radiance.size() * sizeof(Rgb)), 0);
+    EXPECT_EQ(one.counters.rays, four.counters.rays);
+  }
+}
+
+TEST(IlluminationCut, ImageDoesNotDependOnTheScaleOfTheScene) {
+  // The same set of lights, scaled: where light paths turn is not the method's doing.
+  const auto unit_scene = test::make_room();
+  const VplSet vpls = test::lights_of(*unit_scene, 3000);
+  const auto unit = test::render(*unit_scene, kId, vpls, {}).radiance;
+  for (float scale : {1.0f / 1024, 1024.0f}) {
+    const auto scene = test::make_room(scale);
+    VplSet scaled = vpls;
+    for (Vpl& v : scaled.lights) v.position = v.position * scale, v.intensity = v.intensity * (scale * scale);
+    EXPECT_LT(test::rmse_over_mean(test::render(*scene, kId, scaled, {}).radiance, unit), 1e-3) << scale;
+  }
+}
+
+TEST(IlluminationCut, LightsOfEveryKind) {
+  const auto scene = test::make_room();
+  VplSet vpls;
+  Rng rng(1, Stage::test);
+  for (int i = 0; i < 2000; ++i) {
+    Vpl v;
+    v.kind = static_cast<VplKind>(i % 4);
+    v.position = test::random_point(rng, 0.9f);
+    if (v.kind != VplKind::omni) v.normal = test::random_direction(rng);
+    if (v.kind == VplKind::spot) v.cos_outer = 0.5f, v.blend_cosine = 0.2f;
+    const float power = rng.next_float();
+    v.intensity = Rgb{power, power, power} * 0.01f;
+    vpls.lights.push_back(v);
+  }
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}), frame = test::render(*scene, kId, vpls, {});
+  EXPECT_LT(test::mean_relative_error(frame.radiance, reference.radiance), 0.02);
+}
+
+TEST(IlluminationCut, DegenerateInputIsNoTrouble) {
+  const auto scene = test::make_room();
+  const auto none = test::render(*scene, kId, VplSet{}, {}, 16, 16);
+  for (const Rgb& c : none.radiance) EXPECT_TRUE(is_finite(c));
+  VplSet one;
+  one.lights.resize(1);
+  one.lights[0].position = {0, -0.5f, 0.8f};
+  one.lights[0].intensity = {1, 1, 1};
+  const auto single = test::render(*scene, kId, one, {}, 16, 16);
+  EXPECT_LT(test::mean_relative_error(single.radiance, test::render(*scene, "exhaustive", one, {}, 16, 16).radiance),
+            1e-6);
+  VplSet many;
+  many.lights.assign(200000, one.lights[0]);
+  for (Vpl& v : many.lights) v.intensity = Rgb{1, 1, 1} * (1 / 200000.0f);
+  const auto coincident = test::render(*scene, kId, many, {}, 16, 16);
+  // Hundreds of thousands of summands in single precision.
+  EXPECT_LT(test::mean_relative_error(coincident.radiance, single.radiance), 2e-3);
+}
+
+TEST(IlluminationCut, IsCancelledAndTakesNoPoints) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 1000);
+  const IntegratorEntry* entry = find_integrator(kId);
+  const Params params(all_params(*entry));
+  Progress progress;
+  Stats stats;
+  const auto integrator = entry->create();
+  integrator->prepare(*scene, vpls, params, {progress, stats});
+  ShadePoints points;
+  points.finish();
+  integrator->shade(points, {}, {}, {progress, stats});
+  SurfacePoint p;
+  p.position = {0, 0, 0.9f}, p.normal = p.mirror = {0, 0, -1};
+  for (int i = 0; i < 500; ++i) points.push(p);
+  points.finish();
+  std::vector<Rgb> radiance(points.size());
+  progress.cancel();
+  EXPECT_THROW(integrator->shade(points, radiance, {}, {progress, stats}), Error);
+}
+
+}  // namespace lumicut
