@@ -24,19 +24,24 @@ BallQueryTree::BallQueryTree(std::span<const double> points, int dimension) : di
   std::iota(ids_.begin(), ids_.end(), 0u);
   if (n == 0) return;
   build(points, 0, n);
-  const uint32_t buckets = (n + kBucket - 1) / kBucket;
-  padding_ = buckets * kBucket - n;
-  coords_.assign(static_cast<size_t>(buckets) * kBucket * d,
-                 std::numeric_limits<double>::infinity());  // pads are infinitely far
-  for (uint32_t i = 0; i < n; ++i)
-    for (size_t j = 0; j < d; ++j) coords_[(i / kBucket * d + j) * kBucket + i % kBucket] = points[ids_[i] * d + j];
-  ids_.resize(ids_.size() + padding_, 0xffffffffu);
+  count_ = n;
+  coords_.assign(leaves_.size() * kBucket * d, std::numeric_limits<double>::infinity());  // pads are infinitely far
+  std::vector<uint32_t> padded(leaves_.size() * kBucket, 0xffffffffu);
+  for (size_t b = 0; b < leaves_.size(); ++b)
+    for (uint32_t i = leaves_[b].first; i < leaves_[b].second; ++i) {
+      const size_t slot = i - leaves_[b].first;
+      padded[b * kBucket + slot] = ids_[i];
+      for (size_t j = 0; j < d; ++j) coords_[(b * d + j) * kBucket + slot] = points[ids_[i] * d + j];
+    }
+  ids_.swap(padded);
+  leaves_.clear();
+  leaves_.shrink_to_fit();
 }
 
 uint32_t BallQueryTree::build(std::span<const double> points, uint32_t begin, uint32_t end) {
   const auto d = static_cast<size_t>(dim_);
   const auto n = static_cast<uint32_t>(nodes_.size());
-  nodes_.push_back({0, begin / kBucket, (end + kBucket - 1) / kBucket, 0});
+  nodes_.push_back({0, 0, 0});
   const size_t at = centres_.size();
   centres_.resize(at + d, 0.0);
   std::vector<double> lo(d, std::numeric_limits<double>::infinity()), hi(d, -std::numeric_limits<double>::infinity());
@@ -54,16 +59,35 @@ uint32_t BallQueryTree::build(std::span<const double> points, uint32_t begin, ui
     most = std::max(most, sum);
   }
   nodes_[n].radius = std::sqrt(most) * (1 + 1e-14);  // rounding of this sum and of the query's
-  if (end - begin <= kBucket) return n;
+  if (end - begin <= kBucket) {
+    nodes_[n].bucket = static_cast<uint32_t>(leaves_.size());
+    leaves_.push_back({begin, end});
+    return n;
+  }
   size_t widest = 0;
   for (size_t j = 1; j < d; ++j)
     if (hi[j] - lo[j] > hi[widest] - lo[widest]) widest = j;
-  // Whole buckets to the left, so that all but the last are full.
-  const uint32_t buckets = (end - begin + kBucket - 1) / kBucket, mid = begin + buckets / 2 * kBucket;
-  std::nth_element(ids_.begin() + begin, ids_.begin() + mid, ids_.begin() + end, [&](uint32_t a, uint32_t b) {
-    const double x = points[a * d + widest], y = points[b * d + widest];
-    return x < y || (x == y && a < b);
-  });
+  // At the middle of the extent, where that is a gap between clusters; else at the median, so that buckets come out
+  // full.
+  const auto value = [&](uint32_t i) { return points[i * d + widest]; };
+  const double middle = 0.5 * (lo[widest] + hi[widest]);
+  double below = lo[widest], above = hi[widest];
+  uint32_t left = 0;
+  for (uint32_t i = begin; i < end; ++i) {
+    const double x = value(ids_[i]);
+    x < middle ? (++left, below = std::max(below, x)) : above = std::min(above, x);
+  }
+  const uint32_t count = end - begin, buckets = (count + kBucket - 1) / kBucket;
+  uint32_t mid = begin + buckets / 2 * kBucket;
+  if (above - below > 0.1 * (hi[widest] - lo[widest]) && std::min(left, count - left) > count / 32) {
+    mid = begin + left;
+    std::partition(ids_.begin() + begin, ids_.begin() + end, [&](uint32_t i) { return value(i) < middle; });
+  } else {
+    std::nth_element(ids_.begin() + begin, ids_.begin() + mid, ids_.begin() + end, [&](uint32_t i, uint32_t j) {
+      const double x = value(i), y = value(j);
+      return x < y || (x == y && i < j);
+    });
+  }
   build(points, begin, mid);
   const uint32_t right = build(points, mid, end);
   nodes_[n].right = right;
@@ -103,14 +127,14 @@ size_t BallQueryTree::nearest(const double* p, size_t k, uint32_t* index, double
     }
     if (nodes_[n].right != 0) continue;
     double sum[kBucket];
-    const double* rows = &coords_[nodes_[n].begin * d * kBucket];
+    const double* rows = &coords_[nodes_[n].bucket * d * kBucket];
     for (uint32_t i = 0; i < kBucket; ++i) sum[i] = (rows[i] - p[0]) * (rows[i] - p[0]);
     for (size_t j = 1; j < d; ++j) {
       const double x = p[j];
       const double* row = rows + j * kBucket;
       for (uint32_t i = 0; i < kBucket; ++i) sum[i] += (row[i] - x) * (row[i] - x);
     }
-    const uint32_t* ids = &ids_[nodes_[n].begin * kBucket];
+    const uint32_t* ids = &ids_[nodes_[n].bucket * kBucket];
     for (uint32_t i = 0; i < kBucket; ++i) {
       if (!(sum[i] <= worst) || ids[i] == 0xffffffffu) continue;
       if (count == k && sum[i] == worst && ids[i] > index[k - 1]) continue;

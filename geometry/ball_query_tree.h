@@ -1,4 +1,4 @@
-// Nearest neighbours among points that do not change: a ball tree of buckets, built by median splits.
+// Nearest neighbours among points that do not change: a ball tree of buckets, split in gaps and at medians.
 //
 // Not from the paper: bucket leaves of sixteen, coordinate by coordinate, so that a leaf is a few vector operations.
 // Each node keeps the ball around the mean of its points.
@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace lumicut {
@@ -15,7 +16,7 @@ class BallQueryTree {
   // `points`: n rows of `dimension` numbers. Throws invalid_argument as BallTree::build does.
   BallQueryTree(std::span<const double> points, int dimension);
 
-  size_t size() const { return ids_.size() - padding_; }
+  size_t size() const { return count_; }
   // Reusable memory of one thread's queries.
   struct Scratch {
     std::vector<double> stack_near;
@@ -29,13 +30,14 @@ class BallQueryTree {
   static constexpr uint32_t kBucket = 16;
   struct Node {
     double radius;
-    uint32_t begin, end;  // buckets
-    uint32_t right;       // 0: leaf; the left child is the next node
+    uint32_t right;   // 0: leaf; the left child is the next node
+    uint32_t bucket;  // of a leaf
   };
   uint32_t build(std::span<const double> points, uint32_t begin, uint32_t end);
 
   int dim_;
-  uint32_t padding_ = 0;
+  size_t count_ = 0;
+  std::vector<std::pair<uint32_t, uint32_t>> leaves_;  // while building: ranges of ids_
   std::vector<Node> nodes_;
   std::vector<double> centres_;  // by node
   std::vector<double> coords_;   // by bucket: dimension rows of sixteen

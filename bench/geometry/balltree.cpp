@@ -3,9 +3,11 @@
 //
 //   bench_balltree            both parts;   bench_balltree volumes | neighbours | figures   one of them
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "accel/agglomerate.h"
@@ -18,7 +20,7 @@
 #include <nanoflann.hpp>
 #endif
 #ifdef LUMICUT_HAS_CGAL
-#include <CGAL/Epick_d.h>
+#include <CGAL/Dimension.h>
 #include <CGAL/Euclidean_distance.h>
 #include <CGAL/Orthogonal_k_neighbor_search.h>
 #include <CGAL/Search_traits.h>
@@ -31,7 +33,8 @@ struct Data {
   std::vector<double> centres, radii;
 };
 
-// The paper's four: uniform points, the Cantor set's product measure, a polynomial curve, uniform balls with radii to 0.1.
+// The paper's four: uniform points, the Cantor set's product measure, a polynomial curve, uniform balls with radii to
+// 0.1.
 Data make(const char* kind, size_t n, int d, uint64_t seed) {
   Rng rng(seed, Stage::test, static_cast<uint64_t>(d));
   Data data;
@@ -55,20 +58,22 @@ Data make(const char* kind, size_t n, int d, uint64_t seed) {
   return data;
 }
 
-constexpr BallTreeBuilder kBuilders[] = {BallTreeBuilder::kd, BallTreeBuilder::insertion, BallTreeBuilder::cheap_insertion,
-                                         BallTreeBuilder::top_down, BallTreeBuilder::bottom_up};
+constexpr BallTreeBuilder kBuilders[] = {BallTreeBuilder::kd, BallTreeBuilder::insertion,
+                                         BallTreeBuilder::cheap_insertion, BallTreeBuilder::top_down,
+                                         BallTreeBuilder::bottom_up};
 
 void volumes() {
   std::printf("\n## total volume relative to kd, and seconds: kd, insertion, cheap insertion, top-down, bottom-up\n");
-  std::printf("%-8s %2s %6s | %10s | %8s %8s %8s %8s | %8s %8s %8s %8s %8s\n", "data", "d", "leaves", "kd volume", "insert", "cheap",
-              "top-down", "bottom", "kd", "insert", "cheap", "top-down", "bottom");
+  std::printf("%-8s %2s %6s | %10s | %8s %8s %8s %8s | %8s %8s %8s %8s %8s\n", "data", "d", "leaves", "kd volume",
+              "insert", "cheap", "top-down", "bottom", "kd", "insert", "cheap", "top-down", "bottom");
   for (const int d : {2, 5, 10})
     for (const char* kind : {"uniform", "cantor", "curve", "balls"})
       for (const size_t n : {100, 500, 3000}) {
         const Data data = make(kind, n, d, 1);
         double volume[5], seconds[5];
         for (int b = 0; b < 5; ++b)
-          seconds[b] = time_of([&] { volume[b] = BallTree::build(data.centres, data.radii, d, kBuilders[b]).total_volume(); });
+          seconds[b] =
+              time_of([&] { volume[b] = BallTree::build(data.centres, data.radii, d, kBuilders[b]).total_volume(); });
         std::printf("%-8s %2d %6zu | %10.3g |", kind, d, n, volume[0]);
         for (int b = 1; b < 5; ++b) std::printf(" %8.3f", volume[b] / volume[0]);
         std::printf(" |");
@@ -80,7 +85,8 @@ void volumes() {
     for (const char* kind : {"uniform", "cantor", "curve", "balls"}) {
       const Data data = make(kind, 100000, d, 1);
       double volume = 0;
-      const double s = time_of([&] { volume = BallTree::build(data.centres, data.radii, d, BallTreeBuilder::bottom_up).total_volume(); });
+      const double s = time_of(
+          [&] { volume = BallTree::build(data.centres, data.radii, d, BallTreeBuilder::bottom_up).total_volume(); });
       const double kd = BallTree::build(data.centres, data.radii, d, BallTreeBuilder::kd).total_volume();
       std::printf("%-8s %2d %8.2f s, volume %.3f of kd's\n", kind, d, s, volume / kd);
       std::fflush(stdout);
@@ -89,7 +95,9 @@ void volumes() {
 
 // Figures 3-5: brute force against the clever construction.
 void figures() {
-  std::printf("\n## bottom-up by brute force and by best-match tree and heap, uniform points, milliseconds (figures 3-5)\n%6s", "leaves");
+  std::printf(
+      "\n## bottom-up by brute force and by best-match tree and heap, uniform points, milliseconds (figures 3-5)\n%6s",
+      "leaves");
   for (const int d : {2, 5, 10}) std::printf(" %9s d=%-2d %9s d=%-2d", "brute", d, "heap", d);
   std::printf("\n");
   for (const size_t n : {40, 80, 120, 160, 200, 400}) {
@@ -116,7 +124,8 @@ struct Cloud {
   }
 };
 template <int D>
-void with_nanoflann(const std::vector<double>& p, const std::vector<double>& q, size_t k, double& build, double& query, double& sum) {
+void with_nanoflann(const std::vector<double>& p, const std::vector<double>& q, size_t k, double& build, double& query,
+                    double& sum) {
   using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>, Cloud, D, uint32_t>;
   const Cloud cloud{p, D};
   std::unique_ptr<Tree> tree;
@@ -134,16 +143,24 @@ void with_nanoflann(const std::vector<double>& p, const std::vector<double>& q, 
 #endif
 #ifdef LUMICUT_HAS_CGAL
 template <int D>
-void with_cgal(const std::vector<double>& p, const std::vector<double>& q, size_t k, double& build, double& query, double& sum) {
-  using Kernel = CGAL::Epick_d<CGAL::Dimension_tag<D>>;
-  using Point = typename Kernel::Point_d;
-  using Traits = CGAL::Search_traits<double, Point, typename Kernel::Cartesian_const_iterator_d,
-                                     typename Kernel::Construct_cartesian_const_iterator_d, CGAL::Dimension_tag<D>>;
+struct Coordinates {
+  using result_type = const double*;
+  const double* operator()(const std::array<double, D>& x) const { return x.data(); }
+  const double* operator()(const std::array<double, D>& x, int) const { return x.data() + D; }
+};
+template <int D>
+void with_cgal(const std::vector<double>& p, const std::vector<double>& q, size_t k, double& build, double& query,
+               double& sum) {
+  using Point = std::array<double, D>;
+  using Traits = CGAL::Search_traits<double, Point, const double*, Coordinates<D>, CGAL::Dimension_tag<D>>;
   using Search = CGAL::Orthogonal_k_neighbor_search<Traits>;
   using Tree = typename Search::Tree;
   std::vector<Point> points, queries;
-  for (size_t i = 0; i < p.size(); i += D) points.emplace_back(p.begin() + static_cast<std::ptrdiff_t>(i), p.begin() + static_cast<std::ptrdiff_t>(i + D));
-  for (size_t i = 0; i < q.size(); i += D) queries.emplace_back(q.begin() + static_cast<std::ptrdiff_t>(i), q.begin() + static_cast<std::ptrdiff_t>(i + D));
+  for (const auto& [from, to] : {std::pair{&p, &points}, std::pair{&q, &queries}})
+    for (size_t i = 0; i < from->size(); i += D) {
+      to->emplace_back();
+      std::copy_n(from->begin() + static_cast<std::ptrdiff_t>(i), D, to->back().begin());
+    }
   Tree tree(points.begin(), points.end());
   build = time_of([&] { tree.build(); });
   sum = 0;
@@ -172,7 +189,8 @@ void neighbours_in(const char* kind) {
     std::vector<double> dist(k);
     double sum = 0;
     query = time_of([&] {
-      for (size_t i = 0; i < m; ++i) tree->nearest(&queries.centres[i * D], k, index.data(), dist.data(), scratch), sum += dist[k - 1];
+      for (size_t i = 0; i < m; ++i)
+        tree->nearest(&queries.centres[i * D], k, index.data(), dist.data(), scratch), sum += dist[k - 1];
     });
     best[0][0] = std::min(best[0][0], build), best[0][1] = std::min(best[0][1], query), sums[0] = sum;
 #ifdef LUMICUT_HAS_NANOFLANN
@@ -188,13 +206,17 @@ void neighbours_in(const char* kind) {
   std::printf("%-8s %2d |", kind, D);
   for (const auto& b : best) std::printf(" %8.3f %8.2f |", b[0], b[1] * us);
   const auto same = [&](double s) { return s == 0 || std::fabs(s / sums[0] - 1) < 1e-9; };
-  std::printf(" %6.2f %6.2f %s\n", best[0][1] / best[1][1], best[0][1] / best[2][1], same(sums[1]) && same(sums[2]) ? "" : "DIFFERENT ANSWERS");
+  std::printf(" %6.2f %6.2f %s\n", best[0][1] / best[1][1], best[0][1] / best[2][1],
+              same(sums[1]) && same(sums[2]) ? "" : "DIFFERENT ANSWERS");
   std::fflush(stdout);
 }
 
 void neighbours() {
-  std::printf("\n## 10 nearest of 100000 points: build seconds, microseconds a query (best of 3); ours, nanoflann, CGAL; ratios\n");
-  for (const char* kind : {"uniform", "cantor", "curve"}) neighbours_in<2>(kind), neighbours_in<5>(kind), neighbours_in<10>(kind);
+  std::printf(
+      "\n## 10 nearest of 100000 points: build seconds, microseconds a query (best of 3); ours, nanoflann, CGAL; "
+      "ratios\n");
+  for (const char* kind : {"uniform", "cantor", "curve"})
+    neighbours_in<2>(kind), neighbours_in<5>(kind), neighbours_in<10>(kind);
 }
 
 }  // namespace

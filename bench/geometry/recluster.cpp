@@ -1,0 +1,221 @@
+// Face clusters on deforming meshes: the balanced tree (Carr & Hart 2004, tables 3-7) and k-means (fig. 7), beside
+// METIS and meshoptimizer. Needs the scenes (LUMICUT_SCENES); deformations are generated.
+//
+//   bench_recluster [tree | kmeans]
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "bench_util.h"
+#include "core/rng.h"
+#include "geometry/face_cluster_tree.h"
+#include "geometry/face_kmeans.h"
+#include "geometry/mesh_file.h"
+#ifdef LUMICUT_HAS_METIS
+#include <metis.h>
+#endif
+#ifdef LUMICUT_HAS_MESHOPTIMIZER
+#include <meshoptimizer.h>
+#endif
+
+namespace lumicut::bench {
+namespace {
+
+FaceMesh load(const std::string& scenes, const char* name) {
+  return read_obj_mesh(scenes + "/" + name + "/" + name + ".obj");
+}
+
+Vec3d extent(const FaceMesh& m) {
+  Vec3d lo = m.vertices[0], hi = lo;
+  for (const Vec3d& v : m.vertices) lo = min(lo, v), hi = max(hi, v);
+  return hi - lo;
+}
+
+// Pulls a ball of the mesh around a vertex outwards; `reach` and `amount` in parts of the diagonal.
+std::vector<Vec3d> pull(const FaceMesh& m, uint32_t vertex, double reach, double amount) {
+  const double diagonal = length(extent(m));
+  Vec3d mean;
+  for (const Vec3d& v : m.vertices) mean += v;
+  mean = mean / static_cast<double>(m.vertices.size());
+  const Vec3d at = m.vertices[vertex], by = normalize(at - mean) * (amount * diagonal);
+  std::vector<Vec3d> out = m.vertices;
+  for (Vec3d& v : out) {
+    const double d = length(v - at) / (reach * diagonal);
+    if (d < 1) v += by * ((1 - d) * (1 - d));
+  }
+  return out;
+}
+
+void tree(const std::string& scenes) {
+  std::printf(
+      "\n## tree: mean imbalance of inner nodes (and of all nodes), after factors in [.5, 2] and rebalancing; "
+      "seconds\n");
+  std::printf("%-6s %7s | %14s %8s %9s %9s | %14s %9s | %12s %10s\n", "mesh", "faces", "imbalance", "build s",
+              "lists MB", "unjoined", "after noise", "rebal. s", "bloom MB", "rle MB");
+  for (const char* name : {"cow", "bunny", "horse"}) {
+    const FaceMesh m = load(scenes, name);
+    std::unique_ptr<FaceClusterTree> t;
+    const double build = time_of([&] { t = std::make_unique<FaceClusterTree>(m, std::span<const double>()); });
+    std::printf("%-6s %7zu | %6.3f (%5.3f) %8.2f %9.2f %9zu |", name, m.faces.size(), t->mean_imbalance(false),
+                t->mean_imbalance(true), build, static_cast<double>(t->perimeter_bytes()) / 1e6,
+                t->disconnected_clusters(dual_graph(m)));
+    const uint32_t sizes[] = {1000, 8000};
+    FaceClusterTree::Bloom rows[4];
+    double bytes = 0, rle = 0;
+    for (int k = 0; k < 4; ++k) {
+      rows[k] = t->bloom_statistics(2048u << k, 1, sizes);
+      if (k == 2) {
+        const auto two = t->bloom_statistics(8192, 2, sizes);
+        bytes = static_cast<double>(two.bytes) / 1e6, rle = static_cast<double>(two.run_length_bytes) / 1e6;
+      }
+    }
+    Rng rng(1, Stage::test);
+    std::vector<double> w(m.faces.size());
+    for (size_t f = 0; f < w.size(); ++f) w[f] = t->nodes()[f].weight * std::exp2(2 * rng.next_float() - 1);
+    const double again = time_of([&] { t->set_weights(w); });
+    std::printf(" %6.3f (%5.3f) %9.3f | %12.1f %10.1f\n", t->mean_imbalance(false), t->mean_imbalance(true), again,
+                bytes, rle);
+    for (size_t r = 0; r < 2; ++r) {
+      if (rows[0].rows[r].nodes == 0) continue;
+      std::printf(
+          "       bits lost at %u faces, 1 bit an edge, measured / model (Eq. 7, its perimeter), m = 2K 4K 8K 16K:",
+          sizes[r]);
+      for (int k = 0; k < 4; ++k) {
+        double n = 3, e = 3;
+        const double bits = 2048 << k;
+        for (double size = 1; size < 0.99 * sizes[r]; size *= 2) n = 1.5 * n * (1 - n / bits), e *= 1.5;
+        std::printf(" %.3f/%.3f", rows[k].rows[r].loss, 1 - n / e);
+      }
+      std::printf("  perimeter %.0f\n", rows[0].rows[r].edges);
+    }
+    std::fflush(stdout);
+  }
+}
+
+void rivals(const FaceMesh& m, uint32_t k, size_t cut, double seconds) {
+  std::printf("       cut edges at k = %u: ours %zu (%.2f s)", k, cut, seconds);
+#ifdef LUMICUT_HAS_METIS
+  const DualGraph g = dual_graph(m);
+  std::vector<idx_t> offset(g.offset.begin(), g.offset.end()), neighbour(g.neighbour.begin(), g.neighbour.end()),
+      part(m.faces.size());
+  idx_t n = static_cast<idx_t>(m.faces.size()), one = 1, parts = static_cast<idx_t>(k), edge_cut = 0;
+  int status = 0;
+  const double metis = time_of([&] {
+    status = METIS_PartGraphKway(&n, &one, offset.data(), neighbour.data(), nullptr, nullptr, nullptr, &parts, nullptr, nullptr,
+                        nullptr, &edge_cut, part.data());
+  });
+  if (status == METIS_OK) std::printf(", METIS %lld (%.2f s)", static_cast<long long>(edge_cut), metis);
+#endif
+#ifdef LUMICUT_HAS_MESHOPTIMIZER
+  std::vector<unsigned> indices;
+  std::vector<float> positions;
+  for (const auto& f : m.faces) indices.insert(indices.end(), f.begin(), f.end());
+  for (const Vec3d& v : m.vertices)
+    positions.insert(positions.end(), {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)});
+  // meshlets of at most 255 vertices and 512 triangles; the target size is that of our clusters, as far as it goes
+  const size_t most = std::min<size_t>(512, m.faces.size() / k / 4 * 4);
+  std::vector<meshopt_Meshlet> meshlets(meshopt_buildMeshletsBound(indices.size(), 255, most));
+  std::vector<unsigned> vertices(meshlets.size() * 255);
+  std::vector<unsigned char> triangles(meshlets.size() * most * 3);
+  size_t count = 0;
+  const double meshopt = time_of([&] {
+    count = meshopt_buildMeshlets(meshlets.data(), vertices.data(), triangles.data(), indices.data(), indices.size(),
+                                  positions.data(), m.vertices.size(), 12, 255, most, 0.5f);
+  });
+  std::printf(", meshoptimizer %zu meshlets (%.2f s)", count, meshopt);
+#endif
+  std::printf("\n");
+}
+
+void kmeans(const std::string& scenes) {
+  using Method = FaceKmeansOptions::Method;
+  std::printf(
+      "\n## k-means: ms an iteration (mean over all; first; last 10), faces touched late, iterations; 80 iterations, "
+      "seconds\n");
+  for (const char* name : {"bunny", "horse"}) {
+    const FaceMesh m = load(scenes, name);
+    const uint32_t k = 256;
+    size_t cut = 0;
+    double total = 0;
+    FaceKmeansOptions o;
+    o.clusters = k;
+    const char* names[] = {"single", "nested", "increm."};
+    std::vector<uint32_t> labels[3];
+    for (int i = 0; i < 3; ++i) {
+      o.method = i == 0 ? Method::single_heap : i == 1 ? Method::nested_heaps : Method::incremental;
+      FaceKmeans c(m, o);
+      std::vector<double> ms;
+      double eighty = 0;
+      size_t touched = 0;
+      auto state = FaceKmeans::State::changed;
+      while (state == FaceKmeans::State::changed && ms.size() < 400) {
+        ms.push_back(1e3 * time_of([&] { state = c.iterate(); }));
+        if (ms.size() <= 80) eighty += ms.back() / 1e3;
+        touched = c.regrown_faces();
+        if (ms.size() == 80) labels[i] = c.labels();
+      }
+      double mean = 0, late = 0;
+      for (const double x : ms) mean += x;
+      total = mean / 1e3;
+      mean /= static_cast<double>(ms.size());
+      const size_t tail = std::min<size_t>(10, ms.size());
+      for (size_t j = ms.size() - tail; j < ms.size(); ++j) late += ms[j] / static_cast<double>(tail);
+      std::printf(
+          "%-6s %7zu %-8s mean %7.2f first %7.2f late %7.2f (%5.1f %% of first), %6zu faces, %3zu iterations, %s; 80 "
+          "take %6.2f s\n",
+          name, m.faces.size(), names[i], mean, ms[0], late, 100 * late / ms[0], touched, ms.size(),
+          state == FaceKmeans::State::converged ? "converged" : "cycle", eighty);
+      std::fflush(stdout);
+      cut = c.cut_edges();
+      if (i != 2) continue;
+      // A local pull, little by little: one frame is a move and five iterations.
+      FaceMesh moving = m;
+      std::vector<double> frames;
+      for (int frame = 0; frame < 30; ++frame) {
+        const auto next = pull(moving, 1234, 0.05, 0.004);
+        frames.push_back(1e3 * time_of([&] {
+                           c.move(next);
+                           c.run(5);
+                         }));
+        moving.vertices = next;
+      }
+      std::sort(frames.begin(), frames.end());
+      std::printf(
+          "       local deformation, a move and up to 5 iterations: median %.2f ms, worst %.2f ms (60 Hz is 16.7)\n",
+          frames[15], frames.back());
+      frames.clear();
+      for (int frame = 0; frame < 10; ++frame) {
+        const auto next = pull(moving, 4321, 2.0, 0.01);
+        frames.push_back(1e3 * time_of([&] {
+                           c.move(next);
+                           c.run(5);
+                         }));
+        moving.vertices = next;
+      }
+      std::sort(frames.begin(), frames.end());
+      std::printf("       the whole mesh deforming, a move and up to 5 iterations: median %.2f ms, worst %.2f ms\n",
+                  frames[5], frames.back());
+    }
+    std::printf("       labels of the three after 80 iterations: %s\n",
+                labels[0] == labels[1] && labels[0] == labels[2] ? "equal" : "DIFFER");
+    rivals(m, k, cut, total);
+  }
+}
+
+}  // namespace
+}  // namespace lumicut::bench
+
+int main(int argc, char** argv) {
+  using namespace lumicut::bench;
+  print_header("Face clusters on deforming meshes", argc, argv, 1);
+  const std::string scenes = scenes_folder();
+  if (scenes.empty()) {
+    std::printf("# skipped: no scenes (set LUMICUT_SCENES)\n");
+    return 0;
+  }
+  if (argc < 2 || !std::strcmp(argv[1], "tree")) tree(scenes);
+  if (argc < 2 || !std::strcmp(argv[1], "kmeans")) kmeans(scenes);
+}

@@ -1,0 +1,39 @@
+// Pictures of the geometry command: PNG files, a small rasteriser, hitting-set instances.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "geometry/face_mesh.h"
+#include "geometry/point2.h"
+
+namespace lumicut {
+
+using Colour = std::array<uint8_t, 3>;
+
+struct Picture {
+  int width, height;
+  std::vector<uint8_t> rgb;
+  Picture(int w, int h, Colour background);
+  void set(int x, int y, Colour c);
+  void line(double x0, double y0, double x1, double y1, Colour c);
+  void dot(double x, double y, double radius, Colour c);
+};
+
+// Throws invalid_argument when the file cannot be written.
+void write_png(const std::string& path, const Picture& picture);
+
+// Colours that differ for neighbouring numbers.
+Colour label_colour(uint32_t label);
+
+// The mesh from (1, .5, 2) of its box, z or y up, flat-shaded with a colour a face.
+Picture draw_mesh(const FaceMesh& mesh, std::span<const Colour> face_colours, int width, int height, bool z_up);
+
+// Disks as outlines, points grey, chosen points red; .svg or .png by the path's ending.
+void draw_hitting_set(const std::string& path, std::span<const Point2> points, std::span<const Disk> disks,
+                      std::span<const uint32_t> chosen, int size);
+
+}  // namespace lumicut

@@ -1,0 +1,18 @@
+// Points and disks as comma-separated text: "x,y" and "x,y,radius" a line. Empty lines and lines from '#' are skipped,
+// and a first line that does not begin like a number (a heading).
+#pragma once
+
+#include <iosfwd>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "geometry/point2.h"
+
+namespace lumicut {
+
+// Throw invalid_argument naming `name`, the line and the field on what is not a finite number.
+std::vector<Point2> read_points_csv(std::istream& in, const std::string& name);
+std::vector<Disk> read_disks_csv(std::istream& in, const std::string& name);
+
+}  // namespace lumicut

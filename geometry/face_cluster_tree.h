@@ -1,0 +1,84 @@
+// A binary tree of face clusters, balanced by weight and kept compact by perimeter. [Carr & Hart 2004, sec. 3]
+//
+// Departs from the paper:
+// - perimeters are exact sorted lists of edge ids, joined by symmetric difference; they take a fraction of the Bloom
+//   filters' memory. `bloom_statistics` says what the filters would lose and take (Tables 1-4, 6, 7).
+// - the choice follows the text of sec. 3.2, not Fig. 3: an unbalanced node takes the compactest perturbation that
+// brings
+//   it closer to balance, whether or not that is compacter than what it is - out of all that keep both clusters joined.
+// - the mutual recursion of Fig. 3 need not end; a call makes at most `max_steps` perturbations.
+// - components of the mesh are built apart and then joined by weight; on non-manifold edges an edge is in a perimeter
+//   when an odd number of its faces is in the cluster.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "geometry/face_mesh.h"
+
+namespace lumicut {
+
+struct FaceClusterTreeOptions {
+  double alpha = 0.25;  // Eq. 2
+  double tau = 1.0;     // imbalance that is still acceptable
+  int max_steps = 24;   // perturbations that one rebalancing may cause
+  int max_passes = 16;  // over the whole tree, after building and after new weights
+};
+
+class FaceClusterTree {
+ public:
+  static constexpr uint32_t kNone = 0xffffffffu;
+  struct Node {
+    uint32_t left = kNone, right = kNone, parent = kNone;
+    uint32_t faces = 1;  // leaves below
+    double weight = 0;
+    std::vector<uint32_t> perimeter;  // edge ids, ascending
+  };
+
+  // `weights`: one a face, finite and not negative; empty: areas. Throws invalid_argument on bad input.
+  FaceClusterTree(const FaceMesh& mesh, std::span<const double> weights, const FaceClusterTreeOptions& options = {});
+
+  // New weights (a signal that changed, a mesh that moved): all of the tree is rebalanced, leaves first.
+  void set_weights(std::span<const double> weights);
+
+  // Node f is face f's leaf; inner nodes follow. `root` is kNone for a mesh without faces.
+  const std::vector<Node>& nodes() const { return nodes_; }
+  uint32_t root() const { return root_; }
+  double imbalance(uint32_t node) const;  // Eq. 1
+  double mean_imbalance(bool with_leaves) const;
+  size_t perturbations() const { return perturbations_; }
+  size_t perimeter_bytes() const;
+  // Clusters of a level (the root is level 0), numbered from 0: a label a face.
+  std::vector<uint32_t> labels_at_level(int level) const;
+  // Inner clusters, of up to all components, that are not connected.
+  size_t disconnected_clusters(const DualGraph& graph) const;
+
+  struct Bloom {
+    uint64_t bytes = 0, run_length_bytes = 0;  // of all nodes
+    struct Row {
+      uint32_t faces;  // nodes with about so many (within a factor of sqrt 2)
+      size_t nodes = 0;
+      double edges = 0, loss = 0;  // means: exact perimeter, and the share of set bits that collisions lost
+    };
+    std::vector<Row> rows;
+  };
+  // What Bloom filters of `bits` bits and `hashes` bits an edge would be, node by node.
+  Bloom bloom_statistics(uint32_t bits, int hashes, std::span<const uint32_t> sizes) const;
+
+ private:
+  struct Choice;
+  void set_children(uint32_t n, uint32_t a, uint32_t b);
+  void refresh(uint32_t n);
+  void rebalance(uint32_t n, int& steps);
+  void settle();
+  static double imbalance_of(double a, double b);
+  std::vector<uint32_t> postorder() const;
+
+  FaceClusterTreeOptions options_;
+  std::vector<Node> nodes_;
+  uint32_t root_ = kNone;
+  size_t perturbations_ = 0;
+};
+
+}  // namespace lumicut

@@ -1,0 +1,87 @@
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <fstream>
+#include <sstream>
+
+#include "core/error.h"
+#include "geometry/csv.h"
+#include "geometry/mesh_file.h"
+
+namespace lumicut {
+namespace {
+
+template <typename Fn>
+std::string message_of(Fn&& fn) {
+  try {
+    fn();
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(Csv, ReadsHeadingsCommentsAndBlanks) {
+  std::istringstream points("x,y\n1,2\n\n# nothing\n -3.5 , +4e-1 \r\n");
+  const auto p = read_points_csv(points, "p.csv");
+  ASSERT_EQ(p.size(), 2u);
+  EXPECT_EQ(p[1], (Point2{-3.5, 0.4}));
+  std::istringstream disks("1,2,3\n");
+  const auto d = read_disks_csv(disks, "d.csv");
+  ASSERT_EQ(d.size(), 1u);
+  EXPECT_EQ(d[0].radius, 3.0);
+  std::istringstream none("");
+  EXPECT_TRUE(read_points_csv(none, "n").empty());
+}
+
+TEST(Csv, NamesTheLineAndTheFieldOfWhatIsWrong) {
+  const auto read = [](const char* text) {
+    return message_of([&] {
+      std::istringstream in(text);
+      read_disks_csv(in, "d.csv");
+    });
+  };
+  EXPECT_NE(read("1,2,3\n1,nan,3\n").find("line 2: y is nan"), std::string::npos);
+  EXPECT_NE(read("1,2,inf\n").find("radius is inf"), std::string::npos);
+  EXPECT_NE(read("1,2\n").find("line 1: radius is missing"), std::string::npos);
+  EXPECT_NE(read("1,2,3,4\n").find("more than 3 fields"), std::string::npos);
+  EXPECT_NE(read("1,2,3\nx,y,r\n").find("line 2: x is missing or not a number"), std::string::npos);
+}
+
+TEST(ObjMesh, ReadsPolygonsAndNegativeIndicesAndRefusesTheRest) {
+  const std::string path = testing::TempDir() + "lumicut_geometry.obj";
+  const auto read = [&](const char* text) {
+    std::ofstream(path) << text;
+    return read_obj_mesh(path);
+  };
+  const FaceMesh m =
+      read("# a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1 4//1\nf -4/1 -3/2 -2/3\n");
+  ASSERT_EQ(m.faces.size(), 3u);
+  EXPECT_EQ(m.faces[2], (std::array<uint32_t, 3>{0, 1, 2}));
+  EXPECT_NE(message_of([&] { read("v 0 0\n"); }).find("line 1"), std::string::npos);
+  EXPECT_NE(message_of([&] { read("v 0 0 nan\n"); }).find("finite"), std::string::npos);
+  EXPECT_NE(message_of([&] { read("v 0 0 0\nf 1 2 3\n"); }).find("line 2: a vertex index out of range"),
+            std::string::npos);
+  EXPECT_NE(message_of([&] { read("v 0 0 0\nf 1 1\n"); }).find("fewer than three"), std::string::npos);
+  EXPECT_NE(message_of([&] { read_obj_mesh(path + ".absent"); }).find("cannot open"), std::string::npos);
+  std::remove(path.c_str());
+}
+
+TEST(PlyMesh, HasTheSizeThatItsHeaderSays) {
+  const std::string path = testing::TempDir() + "lumicut_geometry.ply";
+  FaceMesh m;
+  m.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  m.faces = {{0, 1, 2}};
+  const std::array<uint8_t, 3> red[] = {{255, 0, 0}};
+  write_ply_mesh(path, m, red);
+  std::ifstream in(path, std::ios::binary);
+  const std::string all((std::istreambuf_iterator<char>(in)), {});
+  const size_t body = all.find("end_header\n") + 11;
+  EXPECT_EQ(all.size() - body, 3u * 12 + 16);
+  EXPECT_NE(all.find("element face 1\n"), std::string::npos);
+  EXPECT_THROW(write_ply_mesh(path, m, {}), Error);
+  std::remove(path.c_str());
+}
+
+}  // namespace
+}  // namespace lumicut
