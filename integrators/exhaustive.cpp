@@ -22,26 +22,28 @@ class Exhaustive final : public Integrator {
       if (context.progress.cancelled()) return;
       auto lit = std::make_unique<LitPoints>();
       const size_t n = end - begin;
-      std::fill(radiance.begin() + begin, radiance.begin() + end, Rgb{});
-      std::vector<PointCounts> local(n);
-      Counters total;
-      total.points = n;
+      float sum[3][kMaxLit] = {};
+      uint32_t rays[kMaxLit] = {}, clusters[kMaxLit] = {};
       for (size_t l = 0; l < vpls_->lights.size(); ++l) {
         if (l % 256 == 0 && context.progress.cancelled()) return;
         const Vpl& light = vpls_->lights[l];
         light_points(light, light.intensity, clamp2_, points, begin, n, *lit);
         trace_lit(scene_->accel(), light, *lit);
-        total.rays += lit->count;
-        for (size_t i = 0; i < lit->count; ++i) {
-          const uint32_t k = lit->index[i];
-          ++local[k].rays;
-          if (lit->occluded[i]) continue;
-          radiance[begin + k] += Rgb{lit->r[i], lit->g[i], lit->b[i]};
-          ++local[k].clusters;
-          ++total.clusters;
+        for (size_t i = 0; i < lit->count; ++i) {  // no branch: what is seen follows no pattern
+          const uint32_t k = lit->index[i], seen = 1u - lit->occluded[i];
+          const auto share = static_cast<float>(seen);
+          sum[0][k] += lit->r[i] * share, sum[1][k] += lit->g[i] * share, sum[2][k] += lit->b[i] * share;
+          ++rays[k];
+          clusters[k] += seen;
         }
       }
-      if (!counts.empty()) std::copy(local.begin(), local.end(), counts.begin() + begin);
+      Counters total;
+      total.points = n;
+      for (size_t k = 0; k < n; ++k) {
+        radiance[begin + k] = {sum[0][k], sum[1][k], sum[2][k]};
+        if (!counts.empty()) counts[begin + k] = {clusters[k], rays[k], 0};
+        total.rays += rays[k], total.clusters += clusters[k];
+      }
       context.stats.add(total);
     });
     context.progress.check();

@@ -133,15 +133,15 @@ std::unique_ptr<Scene> make_scene(const BenchMesh& mesh) {
   return scene;
 }
 
-// Points that the lamp's own VPL neighbourhood sees: hits of a camera in the middle, looking along the longest axis.
+// Hits of a camera in a corner of the upper half, looking at the middle of the floor.
 ShadePoints make_points(const Scene& scene, uint32_t side) {
   const Aabb b = scene.bounds();
   const Vec3f e = b.extent();
   Camera camera;
-  camera.forward = e.x > e.z ? Vec3f{1, 0, 0} : Vec3f{0, 0, 1};
-  camera.up = {0, 1, 0};
-  camera.right = cross(camera.forward, camera.up);
-  camera.position = b.center() - camera.forward * (0.3f * std::max(e.x, e.z));
+  camera.position = b.center() + Vec3f{0.35f * e.x, 0.05f * e.y, 0.3f * e.z};
+  camera.forward = normalize(b.center() - Vec3f{0, 0.2f * e.y, 0} - camera.position);
+  camera.right = normalize(cross(camera.forward, Vec3f{0, 1, 0}));
+  camera.up = cross(camera.right, camera.forward);
   camera.tan_half_fov_y = 0.6f;
   ShadePoints points;
   for (uint32_t tile = 0; tile < (side / 4) * (side / 4); ++tile)  // 4x4 pixels a packet
