@@ -71,6 +71,13 @@ class Integrator {
   // Points that one call of `shade` works best on. Frames come in batches of about this many: small for methods that
   // treat points alone, large for those that cluster them.
   virtual size_t batch_size() const { return 4096; }
+
+  // What `prepare` made, as bytes that `load_state` takes back in its place: the same scene, lights and parameters give
+  // the same radiance. Bytes may come from anywhere: what does not fit throws Error(invalid_argument). By default both
+  // throw Error(unsupported).
+  virtual std::vector<uint8_t> save_state() const;
+  virtual void load_state(const Scene& scene, const VplSet& vpls, const Params& params, std::span<const uint8_t> bytes,
+                          ShadeContext context);
 };
 
 struct IntegratorEntry {

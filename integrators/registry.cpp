@@ -21,6 +21,14 @@ const IntegratorEntry* find_integrator(const std::string& id) {
   return nullptr;
 }
 
+std::vector<uint8_t> Integrator::save_state() const {
+  throw Error(ErrorCode::unsupported, "this integrator has no state to save");
+}
+
+void Integrator::load_state(const Scene&, const VplSet&, const Params&, std::span<const uint8_t>, ShadeContext) {
+  throw Error(ErrorCode::unsupported, "this integrator has no state to load");
+}
+
 std::vector<ParamInfo> all_params(const IntegratorEntry& entry) {
   std::vector<ParamInfo> table = common_params();
   for (const ParamInfo& p : entry.params()) table.push_back(p);

@@ -1,8 +1,12 @@
 // Library, devices, handles, and what every object tells of its work.
+#include <cstring>
+
 #include "plugin/check.h"
 #include "plugin/descriptors.h"
+#include "plugin/include/lumicut/lumicut_state.h"
 #include "plugin/objects.h"
 #include "plugin/render_job.h"
+#include "plugin/state.h"
 
 using namespace lumicut;
 
@@ -14,8 +18,10 @@ const char* lumicut_version(uint32_t* abi_major, uint32_t* abi_minor) {
 
 const char* lumicut_last_error() { return last_error(); }
 
-// None yet.
-const void* lumicut_get_extension(const char*) { return nullptr; }
+const void* lumicut_get_extension(const char* id) {
+  if (id != nullptr && std::strcmp(id, LUMICUT_STATE_EXTENSION) == 0) return state_extension();
+  return nullptr;
+}
 
 lumicut_result lumicut_device_create(const lumicut_device_desc* desc, lumicut_device* device) {
   return guard([&] {

@@ -112,18 +112,6 @@ std::unique_ptr<tbb::global_control> control_for(int threads) {
                                                static_cast<size_t>(threads));
 }
 
-std::string params_text(const Params& params) {
-  std::string out;
-  for (const ParamInfo& p : params.table()) out += std::string(p.id) + "=" + *params.text(p.id) + "\n";
-  return out;
-}
-
-std::string params_text(const Params& params, std::initializer_list<const char*> names) {
-  std::string out;
-  for (const char* name : names) out += std::string(name) + "=" + *params.text(name) + "\n";
-  return out;
-}
-
 VplOptions vpl_options(const Params& params) {
   VplOptions o;
   o.count = static_cast<uint32_t>(params.integer("vpls"));
@@ -134,6 +122,20 @@ VplOptions vpl_options(const Params& params) {
 }
 
 }  // namespace
+
+std::string params_text(const Params& params) {
+  std::string out;
+  for (const ParamInfo& p : params.table()) out += std::string(p.id) + "=" + *params.text(p.id) + "\n";
+  return out;
+}
+
+std::string tracing_key(const Params& params) {
+  std::string out;
+  for (const char* name : {"vpls", "direct_share", "max_depth", "seed"})
+    out += std::string(name) + "=" + *params.text(name) + "\n";
+  return out;
+}
+
 }  // namespace lumicut
 
 using namespace lumicut;
@@ -149,7 +151,7 @@ void lumicut_scene_t::require_committed() const {
 void lumicut_integrator_t::prepare(lumicut_scene_t& of, Progress& progress, Stats& into) {
   if (of.device.get() != device.get()) fail_argument("lumicut_scene: it belongs to another device than the integrator");
   const std::string all = params_text(params);
-  const std::string tracing = params_text(params, {"vpls", "direct_share", "max_depth", "seed"});
+  const std::string tracing = tracing_key(params);
   const bool same_scene =
       prepared != nullptr && prepared->scene.get() == &of && prepared->scene_version == of.scene.version();
   const bool same_source = same_scene && prepared->host_lights == host_lights_id;

@@ -63,6 +63,10 @@ std::string stats_json(double seconds, const Stats& stats);
 uint64_t peak_memory();
 uint64_t resident_memory();
 
+// All parameters, "name=value" a line; and those that light tracing depends on.
+std::string params_text(const Params& params);
+std::string tracing_key(const Params& params);
+
 // What an integrator made of a scene. Never changes once it is made: shade reads it from many threads.
 struct Prepared {
   Ref<lumicut_scene_t> scene;

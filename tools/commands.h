@@ -35,6 +35,7 @@ inline void stop_if_interrupted() {
 
 // Each adds its subcommand to the command line; its callback does the work.
 void add_render(CLI::App& app);
+void add_flythrough(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_info(CLI::App& app);
 

@@ -35,6 +35,7 @@ int run(int argc, char** argv) {
       "Exit codes: 0 done, 1 failed, 2 wrong command line, 3 a file is missing, wrong or cannot be written, 130 "
       "interrupted.");
   add_render(app);
+  add_flythrough(app);
   add_compare(app);
   add_info(app);
   const auto complain = [](const char* text, int code) {

@@ -1,0 +1,212 @@
+// Extension "lumicut.state/1": what an integrator prepared, as bytes. The format is in docs/integrators/wspd.md.
+#include <cstring>
+#include <limits>
+
+#include "core/rng.h"
+#include "plugin/check.h"
+#include "plugin/include/lumicut/lumicut_state.h"
+#include "plugin/objects.h"
+#include "plugin/state.h"
+#include "vpl/trace_vpls.h"
+
+using namespace lumicut;
+
+namespace {
+
+constexpr char kMagic[8] = {'L', 'U', 'M', 'I', 'C', 'U', 'T', 'S'};
+constexpr uint32_t kVersion = 1, kByteOrder = 0x01020304u;
+
+// Followed by the integrator's id, its parameters as text, the lights, and the method's own bytes.
+struct Header {
+  char magic[8];
+  uint32_t version, byte_order;
+  uint64_t size;      // of all
+  uint64_t checksum;  // of all that follows the header, and of the fields below
+  uint64_t scene;     // hash of its geometry
+  uint64_t lights, light_paths;
+  uint64_t method_bytes;
+  uint32_t id_bytes, params_bytes;
+  uint32_t host_lights, reserved;
+};
+static_assert(sizeof(Header) == 80);
+
+uint64_t hash_bytes(uint64_t seed, const void* data, size_t size) {
+  const auto* bytes = static_cast<const uint8_t*>(data);
+  uint64_t h = hash64(seed ^ size);
+  for (; size >= 8; size -= 8, bytes += 8) {
+    uint64_t word;
+    std::memcpy(&word, bytes, 8);
+    h = (h ^ word) * 0x9e3779b97f4a7c15ull;
+    h ^= h >> 29;
+  }
+  uint64_t word = 0;
+  std::memcpy(&word, bytes, size);
+  return hash64(h ^ word);
+}
+
+template <typename T>
+uint64_t hash_array(uint64_t seed, const std::vector<T>& v) {
+  return hash_bytes(seed, v.data(), v.size() * sizeof(T));
+}
+
+uint64_t geometry_hash(const Scene& scene) {
+  uint64_t h = 1;
+  for (const Mesh& m : scene.meshes()) h = hash_array(hash_array(hash_array(h, m.positions), m.indices), m.instances);
+  return h;
+}
+
+uint64_t checksum(const Header& h, const uint8_t* body, size_t size) {
+  const uint64_t fields[] = {h.size,
+                             h.scene,
+                             h.lights,
+                             h.light_paths,
+                             h.method_bytes,
+                             uint64_t{h.id_bytes} << 32 | h.params_bytes,
+                             uint64_t{h.host_lights} << 32 | h.reserved};
+  return hash_bytes(hash_bytes(7, fields, sizeof(fields)), body, size);
+}
+
+std::vector<uint8_t> save(lumicut_integrator_t& i) {
+  if (i.prepared == nullptr) fail_state("lumicut_integrator: nothing is prepared, so nothing can be saved");
+  const Prepared& p = *i.prepared;
+  const std::vector<uint8_t> own = p.method->save_state();
+  const std::string id = i.entry.id;
+  Header h{};
+  std::memcpy(h.magic, kMagic, sizeof(kMagic));
+  h.version = kVersion, h.byte_order = kByteOrder;
+  h.scene = geometry_hash(p.scene->scene);
+  h.lights = p.vpls->lights.size(), h.light_paths = p.vpls->light_paths;
+  h.method_bytes = own.size();
+  h.id_bytes = static_cast<uint32_t>(id.size()), h.params_bytes = static_cast<uint32_t>(p.params_key.size());
+  h.host_lights = p.host_lights != 0 ? 1 : 0;
+  h.size = sizeof(Header) + id.size() + p.params_key.size() + h.lights * sizeof(Vpl) + own.size();
+  std::vector<uint8_t> out(h.size);
+  uint8_t* at = out.data() + sizeof(h);
+  const auto append = [&](const void* data, size_t size) {
+    if (size > 0) std::memcpy(at, data, size);
+    at += size;
+  };
+  append(id.data(), id.size());
+  append(p.params_key.data(), p.params_key.size());
+  append(p.vpls->lights.data(), h.lights * sizeof(Vpl));
+  append(own.data(), own.size());
+  h.checksum = checksum(h, out.data() + sizeof(h), out.size() - sizeof(h));
+  std::memcpy(out.data(), &h, sizeof(h));
+  return out;
+}
+
+[[noreturn]] void fail_bytes(const std::string& what) { fail_argument("state: " + what); }
+
+// Throws Error naming the first parameter that differs.
+void compare_params(const std::string& saved, const std::string& now) {
+  size_t a = 0, b = 0;
+  while (a < saved.size() && b < now.size()) {
+    const size_t a_end = saved.find('\n', a), b_end = now.find('\n', b);
+    const std::string one = saved.substr(a, a_end - a), other = now.substr(b, b_end - b);
+    if (one != other) fail_bytes("it was made with " + one + ", but the integrator has " + other);
+    if (a_end == std::string::npos || b_end == std::string::npos) break;
+    a = a_end + 1, b = b_end + 1;
+  }
+  if (saved.size() != now.size()) fail_bytes("its parameters are not this integrator's");
+}
+
+void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uint64_t size, Progress& progress,
+          Stats& stats) {
+  Header h;
+  if (size < sizeof(h)) fail_bytes(number_text(size) + " bytes are too few");
+  std::memcpy(&h, bytes, sizeof(h));
+  if (std::memcmp(h.magic, kMagic, sizeof(kMagic)) != 0) fail_bytes("these bytes are no saved state");
+  if (h.byte_order != kByteOrder) fail_bytes("it was saved on a machine of another byte order");
+  if (h.version != kVersion)
+    fail_bytes("it has version " + number_text(uint64_t{h.version}) + ", this library reads " +
+               number_text(uint64_t{kVersion}));
+  if (h.size != size)
+    fail_bytes("it is " + number_text(size) + " bytes long instead of " + number_text(h.size) + ": cut or joined");
+  uint64_t left = size - sizeof(h);
+  const auto take = [&](uint64_t count, uint64_t each) {
+    if (count > left / each) fail_bytes("its parts are longer than it is: damaged");
+    left -= count * each;
+  };
+  take(h.id_bytes, 1), take(h.params_bytes, 1), take(h.lights, sizeof(Vpl)), take(h.method_bytes, 1);
+  const uint8_t* at = bytes + sizeof(h);
+  if (left != 0 || checksum(h, at, size - sizeof(h)) != h.checksum) fail_bytes("its checksum is wrong: damaged");
+
+  const std::string id(reinterpret_cast<const char*>(at), h.id_bytes);
+  if (id != i.entry.id) fail_bytes("it is of \"" + id + "\", not of \"" + i.entry.id + "\"");
+  at += h.id_bytes;
+  const std::string params(reinterpret_cast<const char*>(at), h.params_bytes);
+  compare_params(params, params_text(i.params));
+  at += h.params_bytes;
+  if (h.scene != geometry_hash(s.scene)) fail_bytes("it was made for a scene of other geometry");
+  auto vpls = std::make_shared<VplSet>();
+  vpls->light_paths = h.light_paths;
+  vpls->lights.resize(h.lights);
+  if (h.lights > 0) std::memcpy(static_cast<void*>(vpls->lights.data()), at, h.lights * sizeof(Vpl));
+  at += h.lights * sizeof(Vpl);
+  for (const Vpl& v : vpls->lights)
+    if (static_cast<uint32_t>(v.kind) >= kVplKinds || !is_finite(v.position) || !is_finite(v.normal))
+      fail_bytes("a light in it makes no sense");
+
+  auto next = std::make_unique<Prepared>();
+  next->scene = Ref(s);
+  next->scene_version = s.scene.version();
+  next->params_key = params;
+  next->vpls_key = tracing_key(i.params);
+  next->host_lights = h.host_lights != 0 ? i.host_lights_sets + 1 : 0;
+  next->params = i.params;
+  next->standing_off = off_surfaces(*vpls, s.scene);
+  next->method = i.entry.create();
+  next->method->load_state(s.scene, next->standing_off, *next->params, {at, h.method_bytes}, {progress, stats});
+  stats.set_value("vpls", static_cast<double>(vpls->lights.size()));
+  stats.set_value("light_paths", static_cast<double>(h.light_paths));
+  // From here nothing fails.
+  i.host_lights = h.host_lights != 0 ? std::shared_ptr<const VplSet>(vpls) : nullptr;
+  i.host_lights_id = next->host_lights;
+  if (h.host_lights != 0) ++i.host_lights_sets;
+  next->vpls = std::move(vpls);
+  i.prepared = std::move(next);
+}
+
+lumicut_result save_state(lumicut_integrator integrator, void* bytes, uint64_t* size) {
+  return guard([&] {
+    lumicut_integrator_t& i = object(integrator);
+    const Gate::Hold hold = i.gate.change("lumicut_state_extension.save");
+    if (size == nullptr) fail_argument("lumicut_state_extension.save: size is NULL");
+    const std::vector<uint8_t> state = i.device->arena.run([&] { return save(i); });
+    if (bytes != nullptr) {
+      if (*size < state.size())
+        fail_argument("lumicut_state_extension.save: size: " + number_text(*size) + " bytes are less than " +
+                      number_text(uint64_t{state.size()}));
+      std::memcpy(bytes, state.data(), state.size());
+    }
+    *size = state.size();
+  });
+}
+
+lumicut_result load_state(lumicut_integrator integrator, lumicut_scene scene, const void* bytes, uint64_t size) {
+  return guard([&] {
+    lumicut_integrator_t& i = object(integrator);
+    lumicut_scene_t& s = object(scene);
+    const Gate::Hold changing = i.gate.change("lumicut_state_extension.load");
+    const Gate::Hold reading = s.gate.read("lumicut_state_extension.load");
+    s.require_committed();
+    if (s.device.get() != i.device.get())
+      fail_argument("lumicut_scene: it belongs to another device than the integrator");
+    if (bytes == nullptr) fail_argument("lumicut_state_extension.load: bytes is NULL");
+    auto stats = std::make_unique<Stats>();
+    run_work(i.work, [&](Progress& progress) {
+      i.device->arena.run([&] { load(i, s, static_cast<const uint8_t*>(bytes), size, progress, *stats); });
+    });
+    i.stats = std::move(stats);
+  });
+}
+
+const lumicut_state_extension kTable = {sizeof(lumicut_state_extension), 0, save_state, load_state};
+
+}  // namespace
+
+namespace lumicut {
+
+const void* state_extension() { return &kTable; }
+
+}  // namespace lumicut
