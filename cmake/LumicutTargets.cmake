@@ -26,8 +26,13 @@ add_library(lumicut_options INTERFACE)
 target_compile_options(lumicut_options INTERFACE -Wall -Wextra -Wshadow -Werror -Wno-restrict
   $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor -Woverloaded-virtual>)
 # Highway compiles hot loops for a portable fallback, SSE4, AVX2 and AVX-512, and picks one at run time.
-target_compile_definitions(lumicut_options INTERFACE
-  "HWY_DISABLED_TARGETS=HWY_SSSE3")
+# Sanitizers take minutes a file and set: they check one, and the fallback.
+if(LUMICUT_SANITIZE)
+  set(disabled_targets "(HWY_SSSE3|HWY_SSE4|HWY_AVX3)")
+else()
+  set(disabled_targets HWY_SSSE3)
+endif()
+target_compile_definitions(lumicut_options INTERFACE "HWY_DISABLED_TARGETS=${disabled_targets}")
 target_include_directories(lumicut_options INTERFACE ${PROJECT_SOURCE_DIR})
 if(LUMICUT_SANITIZE)
   target_compile_options(lumicut_options INTERFACE -fsanitize=${LUMICUT_SANITIZE} -fno-omit-frame-pointer -g)
