@@ -42,8 +42,6 @@ struct SceneData {
   uint32_t width = 512, height = 512, samples = 1;  // what the scene file proposes
   std::vector<std::string> warnings;                // what is approximated or looks wrong
 
-  // How far off its surface a light must stand so that shadow rays clear it in float: 2e-5 of the scene's radius.
-  double surface_offset() const;
   uint64_t triangle_count() const {
     uint64_t n = 0;
     for (const auto& mesh : meshes) n += mesh.indices.size() / 3;

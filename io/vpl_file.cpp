@@ -57,10 +57,9 @@ void check(const std::string& path, uint64_t index, lumicut_vpl& light) {
 
 }  // namespace
 
-VplFile read_vpls(const std::string& path) {
+std::vector<lumicut_vpl> read_vpls(const std::string& path) {
   const std::string bytes = read_whole_file(path, uint64_t{64} << 30);
-  VplFile file;
-  std::vector<lumicut_vpl>& lights = file.lights;
+  std::vector<lumicut_vpl> lights;
   Header header{};
   if (bytes.size() >= sizeof(kMagic) && std::memcmp(bytes.data(), kMagic, sizeof(kMagic)) == 0) {
     if (bytes.size() < sizeof(header))
@@ -88,7 +87,6 @@ VplFile read_vpls(const std::string& path) {
           fmt::format(
               "is no VPL file: neither starts with LUMIVPL, nor do its {} bytes hold a count and as many records of 36",
               bytes.size()));
-    file.on_surfaces = true;
     lights.resize(count);
     for (uint64_t i = 0; i < count; ++i) {
       PeerRecord record;
@@ -103,14 +101,7 @@ VplFile read_vpls(const std::string& path) {
     }
   }
   for (uint64_t i = 0; i < lights.size(); ++i) check(path, i, lights[i]);
-  return file;
-}
-
-void move_off_surfaces(std::vector<lumicut_vpl>& lights, double distance) {
-  for (auto& light : lights)
-    if (light.kind == LUMICUT_VPL_ORIENTED)
-      for (int k = 0; k < 3; ++k)
-        light.position[k] = static_cast<float>(double{light.position[k]} + distance * double{light.normal[k]});
+  return lights;
 }
 
 void write_vpls(const std::string& path, const lumicut_vpl* lights, uint64_t count) {

@@ -126,7 +126,7 @@ class FlythroughCommand {
     const io::SceneData data = io::read_scene(o_.scene);
     const auto cameras = read_cameras(o_.cameras, data.camera);
     io::upload_scene(api(), scene_.get(), data);
-    set_host_lights(data);
+    set_host_lights();
     io::check(api(), api().scene_set_camera(scene_.get(), cameras.data()), o_.cameras);
     io::check(api(), api().scene_commit(scene_.get()), o_.scene);
     stop_if_interrupted();
@@ -177,12 +177,11 @@ class FlythroughCommand {
       throw UsageError("--save-state, --load-state: this library has no extension " LUMICUT_STATE_EXTENSION);
   }
 
-  void set_host_lights(const io::SceneData& data) {
+  void set_host_lights() {
     if (o_.vpl_in.empty()) return;
-    io::VplFile file = io::read_vpls(o_.vpl_in);
-    if (file.lights.empty()) throw UsageError(fmt::format("--vpl-in {}: holds no light", o_.vpl_in));
-    if (file.on_surfaces) io::move_off_surfaces(file.lights, data.surface_offset());
-    io::check(api(), api().integrator_set_lights(integrator_.get(), file.lights.data(), file.lights.size()), o_.vpl_in);
+    const std::vector<lumicut_vpl> lights = io::read_vpls(o_.vpl_in);
+    if (lights.empty()) throw UsageError(fmt::format("--vpl-in {}: holds no light", o_.vpl_in));
+    io::check(api(), api().integrator_set_lights(integrator_.get(), lights.data(), lights.size()), o_.vpl_in);
   }
 
   void prepare() {

@@ -194,7 +194,7 @@ class RenderCommand {
     }
     if (o_.vpl_in.empty()) return;
     lights_ = io::read_vpls(o_.vpl_in);
-    if (lights_.lights.empty()) throw UsageError(fmt::format("--vpl-in {}: holds no light", o_.vpl_in));
+    if (lights_.empty()) throw UsageError(fmt::format("--vpl-in {}: holds no light", o_.vpl_in));
   }
 
   void read_scene() {
@@ -207,7 +207,7 @@ class RenderCommand {
     stop_if_interrupted();
     io::upload_scene(api(), scene_.get(), data);
     triangles_ = data.triangle_count();
-    set_lights(data);
+    set_lights();
     desc_.struct_size = sizeof(desc_);
     desc_.width = size_.empty() ? data.width : size_[0];
     desc_.height = size_.empty() ? data.height : size_[1];
@@ -219,11 +219,9 @@ class RenderCommand {
     read_seconds_ = now() - start;
   }
 
-  void set_lights(const io::SceneData& data) {
-    auto& lights = lights_.lights;
-    if (lights.empty()) return;
-    if (lights_.on_surfaces) io::move_off_surfaces(lights, data.surface_offset());
-    io::check(api(), api().integrator_set_lights(integrator_.get(), lights.data(), lights.size()), o_.vpl_in);
+  void set_lights() {
+    if (lights_.empty()) return;
+    io::check(api(), api().integrator_set_lights(integrator_.get(), lights_.data(), lights_.size()), o_.vpl_in);
   }
 
   void commit() {
@@ -329,8 +327,8 @@ class RenderCommand {
   io::Handle<lumicut_scene> scene_{library_.api()};
   io::Handle<lumicut_integrator> integrator_{library_.api()};
   io::Handle<lumicut_render> render_{library_.api()};
-  InterruptWatcher watcher_;  // ends before the handles that it may cancel
-  io::VplFile lights_;        // of --vpl-in
+  InterruptWatcher watcher_;         // ends before the handles that it may cancel
+  std::vector<lumicut_vpl> lights_;  // of --vpl-in
   std::vector<uint32_t> size_, crop_;
   lumicut_render_desc desc_{};
   uint64_t triangles_ = 0;
