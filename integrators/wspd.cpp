@@ -17,6 +17,7 @@ namespace {
 
 constexpr size_t kBlock = kMaxLit;   // most points of a block
 constexpr size_t kSamples = kLanes;  // points of a block that stand for it
+constexpr float kStrong = 0.2f;      // of the brightest cluster allowed: visibility is not taken over for whole blocks
 constexpr size_t kPart = 64;         // of a block where the samples disagree: looked at alone
 
 // Points of a batch, reordered so that blocks are contiguous; each block starts at a multiple of kLanes.
@@ -124,6 +125,7 @@ bool behind(const Blocks::Block& b, const WspdNode& n) {
 struct Cluster {
   uint32_t node = 0;
   bool directional = false;
+  bool strong = false;             // its shadows matter enough to be looked at in parts of the block
   Vec3f origin{};                  // of its shadow rays; directional: where light comes from
   float share = 1.0f;              // R of Eq. 2.21
   uint32_t lit = 0, seen = 0;      // samples that get light from it; and are not in its shadow
@@ -223,7 +225,7 @@ class Wspd final : public Integrator {
     for (size_t c = 0; c < work.clusters.size(); ++c) {
       if (c % 64 == 0 && progress.cancelled()) return;
       const Cluster& cluster = work.clusters[c];
-      const bool agreed = sampling_ && cluster.lit >= kSamples / 2;
+      const bool agreed = sampling_ && !cluster.strong && cluster.lit >= kSamples / 2;
       if ((agreed && cluster.seen == 0) || cluster.share == 0.0f) continue;
       ++used;
       if (agreed && cluster.seen == cluster.lit)
@@ -347,6 +349,8 @@ class Wspd final : public Integrator {
       bool bright = bright_ == 0.0f;
       for (size_t s = 0; s < kSamples; ++s) bright = bright || work.clusters[c].luminance[s] > limit[s];
       if (n.leaf() || !bright) {
+        for (size_t k = 0; k < kSamples; ++k)
+          work.clusters[c].strong = work.clusters[c].strong || work.clusters[c].luminance[k] > kStrong * limit[k];
         if (kept != c) work.clusters[kept] = work.clusters[c];
         ++kept;
         continue;
@@ -411,7 +415,7 @@ std::vector<ParamInfo> params() {
       {"local_visibility", "Visibility in clusters",
        "cubemap: the share of a cluster's light that leaves it, by direction; representative: one of its lights stands "
        "for all",
-       "", ParamType::choice, "cubemap", 0, 0, "cubemap|representative"},
+       "", ParamType::choice, "representative", 0, 0, "representative|cubemap"},
       {"normal_threshold", "Normal threshold", "Lights of a cluster whose normals differ by less count as one", "",
        ParamType::real, "0.01", 0, 2},
       {"block", "Largest block", "Most points that share a clustering", "points", ParamType::integer, "256", 16, 256},
