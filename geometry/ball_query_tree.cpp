@@ -51,6 +51,7 @@ uint32_t BallQueryTree::build(std::span<const double> points, uint32_t begin, ui
       centres_[at + j] += p[j], lo[j] = std::min(lo[j], p[j]), hi[j] = std::max(hi[j], p[j]);
   }
   for (size_t j = 0; j < d; ++j) centres_[at + j] /= static_cast<double>(end - begin);
+  for (size_t j = 0; j < d; ++j) boxes_.push_back(lo[j]), boxes_.push_back(hi[j]);
   double most = 0;
   for (uint32_t i = begin; i < end; ++i) {
     const double* p = &points[ids_[i] * d];
@@ -106,6 +107,15 @@ size_t BallQueryTree::nearest(const double* p, size_t k, uint32_t* index, double
     for (size_t j = 0; j < d; ++j) sum += (p[j] - c[j]) * (p[j] - c[j]);
     return std::sqrt(sum);
   };
+  const auto to_box = [&](uint32_t n) {
+    const double* b = &boxes_[n * 2 * d];
+    double sum = 0;
+    for (size_t j = 0; j < d; ++j) {
+      const double x = std::max(std::max(b[2 * j] - p[j], p[j] - b[2 * j + 1]), 0.0);
+      sum += x * x;
+    }
+    return std::sqrt(sum) * (1 - 1e-14);
+  };
   auto& nodes = scratch.stack_node;
   auto& nears = scratch.stack_near;
   nodes.assign(1, 0u);
@@ -119,6 +129,9 @@ size_t BallQueryTree::nearest(const double* p, size_t k, uint32_t* index, double
       uint32_t a = n + 1, b = nodes_[n].right;
       double da = to_centre(a), db = to_centre(b);
       double na = da - nodes_[a].radius, nb = db - nodes_[b].radius;
+      // Where the ball does not rule a child out, its box may.
+      if (na <= reach) na = std::max(na, to_box(a));
+      if (nb <= reach) nb = std::max(nb, to_box(b));
       // Inside both balls the nearer centre goes first.
       if (std::max(na, 0.0) > std::max(nb, 0.0) || (na <= 0 && nb <= 0 && da > db)) std::swap(a, b), std::swap(na, nb);
       if (nb <= reach) nodes.push_back(b), nears.push_back(nb);

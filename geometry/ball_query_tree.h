@@ -40,6 +40,7 @@ class BallQueryTree {
   std::vector<std::pair<uint32_t, uint32_t>> leaves_;  // while building: ranges of ids_
   std::vector<Node> nodes_;
   std::vector<double> centres_;  // by node
+  std::vector<double> boxes_;    // by node: lo and hi of each coordinate
   std::vector<double> coords_;   // by bucket: dimension rows of sixteen
   std::vector<uint32_t> ids_;    // by bucket
 };

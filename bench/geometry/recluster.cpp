@@ -155,7 +155,6 @@ void kmeans(const std::string& scenes) {
         ms.push_back(1e3 * time_of([&] { state = c.iterate(); }));
         if (ms.size() <= 80) eighty += ms.back() / 1e3;
         touched = c.regrown_faces();
-        if (ms.size() == 80) labels[i] = c.labels();
       }
       double mean = 0, late = 0;
       for (const double x : ms) mean += x;
@@ -169,6 +168,7 @@ void kmeans(const std::string& scenes) {
           name, m.faces.size(), names[i], mean, ms[0], late, 100 * late / ms[0], touched, ms.size(),
           state == FaceKmeans::State::converged ? "converged" : "cycle", eighty);
       std::fflush(stdout);
+      labels[i] = c.labels();
       cut = c.cut_edges();
       if (i != 2) continue;
       // A local pull, little by little: one frame is a move and five iterations.
@@ -199,7 +199,7 @@ void kmeans(const std::string& scenes) {
       std::printf("       the whole mesh deforming, a move and up to 5 iterations: median %.2f ms, worst %.2f ms\n",
                   frames[5], frames.back());
     }
-    std::printf("       labels of the three after 80 iterations: %s\n",
+    std::printf("       labels of the three in the end: %s\n",
                 labels[0] == labels[1] && labels[0] == labels[2] ? "equal" : "DIFFER");
     rivals(m, k, cut, total);
   }
