@@ -84,10 +84,9 @@ class IlluminationCut final : public Integrator {
     const PhaseTimer timer(context.stats, "light tree");
     tree_ = LightTree::build(vpls.lights, {LightTree::Method::agglomerative, 2.0f * scene.radius(), 1, seed_},
                              context.progress);
-    representatives_.clear();
-    if (representative == "central") choose_central();
-    context.stats.set_value("light_tree_bytes",
-                            static_cast<double>(tree_.bytes() + representatives_.size() * sizeof(uint32_t)));
+    means_.clear();
+    if (representative == "mean") find_means();
+    context.stats.set_value("light_tree_bytes", static_cast<double>(tree_.bytes() + means_.size() * sizeof(Mean)));
   }
 
   size_t batch_size() const override { return size_t{1} << 17; }
@@ -103,35 +102,47 @@ class IlluminationCut final : public Integrator {
   }
 
  private:
-  // The light that stands for a node, index into the tree's lights.
-  uint32_t representative(uint32_t node) const {
-    return representatives_.empty() ? tree_.node(node).light : representatives_[node];
+  // What stands for a node's lights: where shadow rays go, and what shines.
+  struct Representative {
+    const Vpl& seen;
+    Vpl shining;
+  };
+  Representative representative(uint32_t index) const {
+    const LightNode& node = tree_.node(index);
+    if (means_.empty() || node.leaf()) return {tree_.lights()[node.light], tree_.lights()[node.light]};
+    const Mean& mean = means_[index];
+    Representative r{tree_.lights()[mean.light], tree_.lights()[mean.light]};
+    // The profile of a spot is bent too much for means; so are cosines that some lights cut off at 90 degrees.
+    if (node.kind == VplKind::spot) return r;
+    r.shining.position = mean.place;
+    if (node.kind == VplKind::oriented && node.cos_half > 0.8f) r.shining.normal = mean.direction;
+    return r;
   }
 
-  // Of the two children's representatives, the one nearer to the mean place and direction of the node's lights.
-  void choose_central() {
+  // Means by luminance, and of the two children's central lights the one nearer to them. A mean direction is shorter
+  // than 1, so that its cosines are the means of the lights' cosines.
+  void find_means() {
     const auto count = static_cast<uint32_t>(tree_.node_count());
-    representatives_.resize(count);
-    std::vector<Vec3f> place(count), direction(count);  // means, by luminance
-    for (uint32_t n = count; n-- > 0;) {                // children come after their parents
+    means_.resize(count);
+    for (uint32_t n = count; n-- > 0;) {  // children come after their parents
       const LightNode& node = tree_.node(n);
+      Mean& mean = means_[n];
       if (node.leaf()) {
         const Vpl& light = tree_.lights()[node.light];
-        place[n] = light.position, direction[n] = light.normal;
-        representatives_[n] = node.light;
+        mean = {light.position, light.normal, node.light};
         continue;
       }
       const uint32_t left = node.first_child, right = left + 1;
       const float l = luminance(tree_.node(left).intensity), r = luminance(tree_.node(right).intensity);
       const float share = l + r > 0.0f ? l / (l + r) : 0.5f;
-      place[n] = place[left] * share + place[right] * (1.0f - share);
-      direction[n] = direction[left] * share + direction[right] * (1.0f - share);
+      mean.place = means_[left].place * share + means_[right].place * (1.0f - share);
+      mean.direction = means_[left].direction * share + means_[right].direction * (1.0f - share);
       const float size2 = std::max(length2(node.half), 1e-30f);
       const auto distance = [&](uint32_t child) {
-        const Vpl& light = tree_.lights()[representatives_[child]];
-        return length2(light.position - place[n]) / size2 + length2(light.normal - direction[n]);
+        const Vpl& light = tree_.lights()[means_[child].light];
+        return length2(light.position - mean.place) / size2 + length2(light.normal - mean.direction);
       };
-      representatives_[n] = representatives_[distance(left) <= distance(right) ? left : right];
+      mean.light = means_[distance(left) <= distance(right) ? left : right].light;
     }
   }
 
@@ -257,10 +268,10 @@ class IlluminationCut final : public Integrator {
     accept &= item.groups, split &= item.groups, descend &= item.groups;
     total.bounds += static_cast<uint64_t>(std::popcount(item.groups));
     if (accept != 0) {
-      const Vpl& light = tree_.lights()[representative(item.node)];
+      const Representative light = representative(item.node);
       const auto lanes = static_cast<uint16_t>(accept);
-      light_points(light, node.intensity, clamp2_, reps, first, kLanes, lit, &lanes);
-      trace_lit(scene_->accel(), light, lit);
+      light_points(light.shining, node.intensity, clamp2_, reps, first, kLanes, lit, &lanes);
+      trace_lit(scene_->accel(), light.seen, lit);
       total.rays += lit.count;
       for (size_t i = 0; i < lit.count; ++i) {
         if (lit.occluded[i]) continue;
@@ -401,8 +412,8 @@ class IlluminationCut final : public Integrator {
                 Workspace& work) const {
     const LightNode& node = tree_.node(index);
     if (!stochastic_ || node.leaf()) {
-      add_light(points, region, group, tree_.lights()[representative(index)], node.intensity, lanes, node.leaf(), index,
-                work);
+      const Representative light = representative(index);
+      add_light(points, region, group, light, node.intensity, lanes, node.leaf(), index, work);
       return;
     }
     // One representative a leaf of points, drawn in proportion to luminance: unbiased, and its error is noise.
@@ -419,25 +430,26 @@ class IlluminationCut final : public Integrator {
         at = rng.next_float() * (l + r) < l ? &left : &right;
       }
       const float share = luminance(node.intensity) / luminance(at->intensity);
-      add_light(points, region, group, tree_.lights()[at->light], at->intensity * share, one, false, index, work);
+      const Vpl& light = tree_.lights()[at->light];
+      add_light(points, region, group, {light, light}, at->intensity * share, one, false, index, work);
     }
   }
 
-  void add_light(const PointTree& points, size_t region, size_t group, const Vpl& light, const Rgb& intensity,
-                 const GroupLanes& lanes, bool exact, uint32_t index, Workspace& work) const {
+  void add_light(const PointTree& points, size_t region, size_t group, const Representative& light,
+                 const Rgb& intensity, const GroupLanes& lanes, bool exact, uint32_t index, Workspace& work) const {
     const size_t base = group * kGroup, first = region * kRegion + base;
     LitPoints& lit = work.lit;
-    light_points(light, intensity, clamp2_, points.points, first, std::min(kGroup, points.size() - first), lit,
+    light_points(light.shining, intensity, clamp2_, points.points, first, std::min(kGroup, points.size() - first), lit,
                  lanes.data());
     if (lit.count == 0) return;
     if (visibility_ == Visibility::full || exact || lit.count < kSampleFrom) {
-      trace_lit(scene_->accel(), light, lit);
+      trace_lit(scene_->accel(), light.seen, lit);
       for (size_t i = 0; i < lit.count; ++i) {
         work.weight[i] = lit.occluded[i] ? 0.0f : 1.0f;
         ++work.rays[base + lit.index[i]];
       }
     } else {
-      sample_visibility(light, base, index, first, work);
+      sample_visibility(light.seen, base, index, first, work);
     }
     for (size_t i = 0; i < lit.count; ++i) {
       const size_t at = base + lit.index[i];
@@ -472,66 +484,44 @@ class IlluminationCut final : public Integrator {
     work.asked_count = 0;
   }
 
-  // Fills `weight` from few rays: one of each of 8 or 16 equal runs of points, more where they disagree.
+  // Fills `weight` from few rays: one of each of 8 to 32 equal runs of points, and all where they disagree. Packets of
+  // neighbours cost so little beside packets of spread samples that a second round of samples does not pay.
   void sample_visibility(const Vpl& light, size_t base, uint32_t index, size_t first, Workspace& work) const {
     const auto n = static_cast<uint32_t>(work.lit.count);
-    const uint32_t runs = n > 32 ? 16 : 8;
+    const uint32_t runs = n > 128 ? 32 : n > 32 ? 16 : 8;
     std::fill(work.known, work.known + n, uint8_t{0});
     Rng rng(seed_, Stage::visibility, first, index);
-    uint32_t samples[16];
+    uint32_t samples[32];
     const auto run_begin = [&](uint32_t r) { return r * n / runs; };
     for (uint32_t r = 0; r < runs; ++r) {
       samples[r] = run_begin(r) + rng.next_below(run_begin(r + 1) - run_begin(r));
       ask(samples[r], work);
     }
     answer(light, base, work);
+    const float seen = work.weight[samples[0]];
     bool agree = true;
-    for (uint32_t r = 1; r < runs; ++r) agree = agree && work.weight[samples[r]] == work.weight[samples[0]];
-    if (agree && visibility_ == Visibility::sampling) {
-      std::fill(work.weight, work.weight + n, work.weight[samples[0]]);
+    for (uint32_t r = 1; r < runs; ++r) agree = agree && work.weight[samples[r]] == seen;
+    if (!agree) {
+      for (uint32_t i = 0; i < n; ++i)
+        if (!work.known[i]) ask(i, work);
+      if (work.asked_count > 0) answer(light, base, work);
       return;
     }
-    if (!agree) {
-      // Long runs get eight samples; those that disagree, and short ones, are traced whole.
-      for (uint32_t r = 0; r < runs; ++r) {
-        const uint32_t begin = run_begin(r), end = run_begin(r + 1), length = end - begin;
-        if (length < kSampleFrom) continue;
-        for (uint32_t s = 0; s < 8; ++s) {
-          const uint32_t i = begin + s * length / 8 + rng.next_below((s + 1) * length / 8 - s * length / 8);
-          if (!work.known[i]) ask(i, work);
-        }
-      }
-      if (work.asked_count > 0) answer(light, base, work);
-      for (uint32_t r = 0; r < runs; ++r) {
-        const uint32_t begin = run_begin(r), end = run_begin(r + 1);
-        bool same = end - begin >= kSampleFrom;
-        for (uint32_t i = begin; i < end; ++i)
-          same = same && (!work.known[i] || work.weight[i] == work.weight[samples[r]]);
-        if (same) continue;
-        for (uint32_t i = begin; i < end; ++i)
-          if (!work.known[i]) ask(i, work);
-      }
-      if (work.asked_count > 0) answer(light, base, work);
-    }
-    for (uint32_t r = 0; r < runs; ++r)
-      for (uint32_t i = run_begin(r); i < run_begin(r + 1); ++i)
-        if (!work.known[i]) work.weight[i] = work.weight[samples[r]];
-    if (visibility_ == Visibility::unbiased) correct(light, base, rng, work);
+    std::fill(work.weight, work.weight + n, seen);
+    if (visibility_ == Visibility::unbiased) correct(light, base, seen, rng, work);
   }
 
   // What was inferred is a control variate: some of it is traced, and its error taken off as often more.
-  void correct(const Vpl& light, size_t base, Rng& rng, Workspace& work) const {
+  void correct(const Vpl& light, size_t base, float inferred, Rng& rng, Workspace& work) const {
     const auto n = static_cast<uint32_t>(work.lit.count);
-    float inferred[kMaxLit];
     for (uint32_t i = 0; i < n; ++i)
-      if (!work.known[i] && rng.next_below(kCorrectOneIn) == 0)
-        inferred[work.asked_count] = work.weight[i], ask(i, work);
+      if (!work.known[i] && rng.next_below(kCorrectOneIn) == 0) ask(i, work);
     const size_t asked = work.asked_count;
     if (asked == 0) return;
     answer(light, base, work);
     for (size_t k = 0; k < asked; ++k) {
       float& w = work.weight[work.asked[k]];
-      w = inferred[k] + (w - inferred[k]) * static_cast<float>(kCorrectOneIn);
+      w = inferred + (w - inferred) * static_cast<float>(kCorrectOneIn);
     }
   }
 
@@ -539,8 +529,12 @@ class IlluminationCut final : public Integrator {
 
   const Scene* scene_ = nullptr;
   LightTree tree_;
-  std::vector<uint32_t> representatives_;  // a node; empty: the tree's own
-  float clamp2_ = 0.0f, error_ = 0.02f, floor_ = 0.01f, separation2_ = 0.01f;
+  struct Mean {
+    Vec3f place, direction;
+    uint32_t light = 0;  // the central one
+  };
+  std::vector<Mean> means_;  // a node; empty: the tree's own representatives serve
+  float clamp2_ = 0.0f, error_ = 0.02f, floor_ = 0.01f, separation2_ = 0.0225f;
   Visibility visibility_ = Visibility::sampling;
   bool stochastic_ = false;
   uint64_t seed_ = 1;
@@ -556,14 +550,15 @@ std::vector<ParamInfo> params() {
        "corrections",
        "", ParamType::choice, "sampling", 0, 0, "full|sampling|unbiased"},
       {"representative", "Representative",
-       "The light that stands for a cluster. central: nearest to the cluster's mean; random: drawn once, by luminance; "
-       "stochastic: drawn anew for each 16 points and pair, noise in place of banding",
-       "", ParamType::choice, "central", 0, 0, "central|random|stochastic"},
+       "What stands for a cluster of lights. mean: their mean shines, the light nearest to it casts the shadows; "
+       "random: "
+       "one, drawn once by luminance; stochastic: drawn anew for each 16 points and pair, noise in place of banding",
+       "", ParamType::choice, "mean", 0, 0, "mean|random|stochastic"},
       {"dark_floor", "Dark floor", "Points darker than this are held to its error", "of the mean radiance",
        ParamType::real, "0.01", 0, 1},
       {"coarse_separation", "Coarse separation",
        "Coarse image: largest cluster that is taken as one, seen from its partner; smaller is slower and surer",
-       "of the distance", ParamType::real, "0.1", 0.001, 1},
+       "of the distance", ParamType::real, "0.15", 0.001, 1},
   };
 }
 

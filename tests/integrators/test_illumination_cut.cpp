@@ -17,7 +17,7 @@ TEST(IlluminationCut, EqualsExhaustiveAtNoErrorWhateverItsModes) {
   const VplSet vpls = test::lights_of(*scene, 3000);
   const auto reference = test::render(*scene, "exhaustive", vpls, {});
   for (const char* visibility : {"full", "sampling", "unbiased"})
-    for (const char* representative : {"central", "stochastic"}) {
+    for (const char* representative : {"mean", "stochastic"}) {
       const auto frame = test::render(*scene, kId, vpls,
                                       {{"error", "0"}, {"visibility", visibility}, {"representative", representative}});
       // Single lights are traced whole: the order of summation alone is left.
@@ -29,7 +29,7 @@ TEST(IlluminationCut, ErrorFallsWithTheParameter) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 10000);
   const auto reference = test::render(*scene, "exhaustive", vpls, {}, 128, 96);
-  for (const char* representative : {"central", "random"}) {
+  for (const char* representative : {"mean", "random"}) {
     double last_error = 1;
     uint64_t last_rays = 0;
     for (const auto& [error, limit] : {std::pair{"0.1", 0.1}, {"0.02", 0.02}, {"0.004", 0.005}}) {
