@@ -49,7 +49,6 @@ std::vector<float> render(const Library& library, const std::string& scene, cons
   Handle<lumicut_scene> handle(api);
   lumicut_scene_desc scene_desc{};
   scene_desc.struct_size = sizeof(scene_desc);
-  scene_desc.robust = 1;
   check(api, api.scene_create(device.get(), &scene_desc, handle.out()), "scene");
   upload_scene(api, handle.get(), read_scene(folder(scene) + "/" + scene + ".json"));
   check(api, api.scene_commit(handle.get()), "commit");
