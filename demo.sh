@@ -8,8 +8,8 @@ cmake --preset release
 cmake --build --preset release --target lumicut lumicut_plugin
 
 scene=${1:-reference_images/indirect_room/indirect_room.json}
-vpls=${2:-20000}
-size=${3:-480x360}
+vpls=${2:-6000}
+size=${3:-320x240}
 out=out/demo
 lumicut=build/release/bin/lumicut
 mkdir -p "$out"
