@@ -41,57 +41,42 @@ HittingSet solve_lists(const Instance& full, const HittingSetOptions& options) {
   return result;
 }
 
-// The memory-bounded path: only some disks have lists. Those with few points hit most of the others along the way.
-HittingSet solve_by_sampling(const PointTree& points, std::span<const Disk> disks, const std::vector<uint32_t>& sizes,
-                             const HittingSetOptions& options) {
-  std::vector<uint32_t> order(disks.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::erase_if(order, [&](uint32_t d) { return sizes[d] == 0; });
-  std::sort(order.begin(), order.end(),
-            [&](uint32_t a, uint32_t b) { return sizes[a] != sizes[b] ? sizes[a] < sizes[b] : a < b; });
-  PointTree tree = points;
-  std::vector<uint32_t> chosen;
-  std::vector<uint8_t> is_chosen(disks.size(), 0);
-  size_t incidences = 0;
-  HittingSet result;
-  for (;;) {
-    // Add unhit disks, small ones first; each one's middle point keeps this round from adding its neighbours as well.
-    bool added = false, missed = false;
-    for (const uint32_t d : order) {
-      if (is_chosen[d] || tree.any_flagged_in(disks[d])) continue;
-      missed = true;
-      if (incidences + sizes[d] > options.max_incidences) continue;
-      incidences += sizes[d];
-      chosen.push_back(d);
-      is_chosen[d] = 1;
-      added = true;
-      uint32_t middle = 0;
-      size_t seen = 0;
-      tree.for_each_in(disks[d], [&](uint32_t p) {
-        // The tree's order is spatial: the one halfway through the list is a point inside, not at the rim.
-        if (2 * seen++ <= sizes[d]) middle = p;
-      });
-      tree.set_flag(middle, true);
-    }
-    if (!missed) break;
-    if (!added) {  // no room for more lists: take a point of every disk that is left
-      for (const uint32_t d : order) {
-        if (tree.any_flagged_in(disks[d])) continue;
-        uint32_t last = 0;
-        tree.for_each_in(disks[d], [&](uint32_t p) { last = p; });
-        tree.set_flag(last, true);
-        result.points.push_back(last);
-      }
-      std::sort(result.points.begin(), result.points.end());
-      break;
-    }
-    std::vector<uint32_t> sorted = chosen;
-    std::sort(sorted.begin(), sorted.end());
-    result = solve_lists(make_instance(tree, disks, sorted), options);
-    result.solved_disks = chosen.size();
-    tree.clear_flags();
-    for (const uint32_t p : result.points) tree.set_flag(p, true);
+// The memory-bounded path: every k-th point along the tree's order, which is spatial, and a point for each disk that
+// holds none of those. Whatever hits all disks among the candidates does so among all points.
+HittingSet solve_thinned(std::span<const Point2> points, const PointTree& full, std::span<const Disk> disks,
+                         const std::vector<uint32_t>& chosen, size_t incidences, const HittingSetOptions& options) {
+  PointTree tree = full;
+  // A bound that holds for all points: disks that have no point in common, small ones first, need one each.
+  std::vector<uint32_t> order = chosen;
+  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+    return disks[a].radius != disks[b].radius ? disks[a].radius < disks[b].radius : a < b;
+  });
+  size_t apart = 0;
+  for (const uint32_t d : order) {
+    if (tree.any_flagged_in(disks[d])) continue;
+    ++apart;
+    full.for_each_in(disks[d], [&](uint32_t p) { tree.set_flag(p, true); });
   }
+  tree.clear_flags();
+  const size_t step = incidences / std::max<size_t>(options.max_incidences, 1) + 1;
+  size_t seen = 0;
+  full.for_each_in({{0, 0}, 1e150}, [&](uint32_t p) {
+    if (seen++ % step == 0) tree.set_flag(p, true);
+  });
+  for (const uint32_t d : order) {
+    if (tree.any_flagged_in(disks[d])) continue;
+    uint32_t some = 0;
+    full.for_each_in(disks[d], [&](uint32_t p) { some = p; });
+    tree.set_flag(some, true);
+  }
+  std::vector<Point2> candidates;
+  std::vector<uint32_t> id;
+  for (uint32_t p = 0; p < points.size(); ++p)
+    if (tree.flagged(p)) candidates.push_back(points[p]), id.push_back(p);
+  HittingSet result = solve_lists(make_instance(PointTree(candidates), disks, chosen), options);
+  for (uint32_t& p : result.points) p = id[p];
+  result.lower_bound = apart;
+  result.candidates = candidates.size();
   return result;
 }
 
@@ -115,12 +100,12 @@ HittingSet solve_hitting_set(std::span<const Point2> points, std::span<const Dis
                              const HittingSetOptions& options) {
   validate_hitting_instance(points, disks);
   const PointTree tree(points);
-  std::vector<uint32_t> sizes(disks.size()), chosen;
+  std::vector<uint32_t> chosen;
   size_t incidences = 0, empty = 0;
   for (size_t d = 0; d < disks.size(); ++d) {
-    sizes[d] = static_cast<uint32_t>(tree.count_in(disks[d]));
-    incidences += sizes[d];
-    if (sizes[d] > 0)
+    const size_t size = tree.count_in(disks[d]);
+    incidences += size;
+    if (size > 0)
       chosen.push_back(static_cast<uint32_t>(d));
     else if (options.drop_empty_disks)
       ++empty;
@@ -130,9 +115,9 @@ HittingSet solve_hitting_set(std::span<const Point2> points, std::span<const Dis
   HittingSet result;
   if (incidences <= options.max_incidences) {
     result = solve_lists(make_instance(tree, disks, chosen), options);
-    result.solved_disks = chosen.size();
+    result.candidates = points.size();
   } else {
-    result = solve_by_sampling(tree, disks, sizes, options);
+    result = solve_thinned(points, tree, disks, chosen, incidences, options);
   }
   result.empty_disks = empty;
   return result;

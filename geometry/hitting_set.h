@@ -18,7 +18,8 @@ struct HittingSetOptions {
   bool drop_empty_disks = false;  // disks without points: false refuses them by index
   bool local_search = true;       // (2,1) and (3,2) moves
   int bound_iterations = 400;     // subgradient steps for the lower bound, which also steer further greedy starts
-  size_t max_incidences = size_t{1} << 27;  // (point, disk) pairs held in memory at once, 8 bytes each
+  // (point, disk) pairs held in memory, about 24 bytes each. More: points are thinned until about so many are left.
+  size_t max_incidences = size_t{1} << 27;
 };
 
 struct HittingSet {
@@ -31,7 +32,7 @@ struct HittingSet {
   size_t empty_disks = 0;                      // dropped
   size_t kernel_points = 0, kernel_disks = 0;  // after dominance reduction
   size_t greedy = 0, pruned = 0;               // sizes on the way
-  size_t solved_disks = 0;  // disks whose lists were held at last; fewer than all: memory-bounded path
+  size_t candidates = 0;  // points considered; fewer than all: memory-bounded path, where the bound is a weaker one
 };
 
 // Throws invalid_argument on coordinates, radii that are not finite (or negative, or beyond 1e70) and, unless they are

@@ -106,13 +106,14 @@ TEST(HittingSet, MemoryBoundedPathHitsEverythingToo) {
     const Instance in = random_instance(seed, 400, 300, 60, 8);
     HittingSetOptions o;
     const HittingSet full = solve_hitting_set(in.points, in.disks, o);
-    EXPECT_EQ(full.solved_disks, in.disks.size());
+    EXPECT_EQ(full.candidates, in.points.size());
     for (const size_t room : {10u, 300u, 1500u}) {
       o.max_incidences = room;
       const HittingSet h = solve_hitting_set(in.points, in.disks, o);
       EXPECT_TRUE(unhit_disks(in.points, in.disks, h.points).empty());
-      EXPECT_LT(h.solved_disks, in.disks.size());
+      EXPECT_LT(h.candidates, in.points.size());
       EXPECT_LE(h.lower_bound, full.points.size());
+      EXPECT_GE(h.lower_bound, 1u);
     }
   }
 }
