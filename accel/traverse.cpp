@@ -453,12 +453,8 @@ class BundleTracer {
   HWY_INLINE BundleTracer(const TraceScene& scene, const Bundle& bundle) : scene_(scene), b_(bundle) {
     // Intervals over the active rays, for culling.
     for (int axis = 0; axis < 3; ++axis) {
-      float lo = kInf, hi = -kInf;
       const float* values = kSun ? b_.o[axis] : b_.r[axis];
-      for (uint64_t m = b_.active; m != 0; m &= m - 1) {
-        const float v = values[__builtin_ctzll(m)];
-        lo = std::min(lo, v), hi = std::max(hi, v);
-      }
+      const auto [lo, hi] = interval(values);
       lo_[axis] = lo, hi_[axis] = hi;
       common_r_[axis] = reciprocal(b_.common[axis]);
       const float sign_lo = kSun ? common_r_[axis] : lo, sign_hi = kSun ? common_r_[axis] : hi;
@@ -467,8 +463,10 @@ class BundleTracer {
     }
     any_mixed_ = mixed_[0] || mixed_[1] || mixed_[2];
     if constexpr (!kSun && C::kRobust)
-      for (uint64_t m = b_.active; m != 0; m &= m - 1)
-        for (int axis = 0; axis < 3; ++axis) reach_ = std::max(reach_, std::abs(b_.d[axis][__builtin_ctzll(m)]));
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto [lo, hi] = interval(b_.d[axis]);
+        reach_ = std::max(reach_, std::max(-lo, hi));
+      }
   }
 
   // Rays that hit something.
@@ -512,6 +510,25 @@ class BundleTracer {
   }
 
  private:
+  struct Interval {
+    float lo, hi;
+  };
+  // Of the active rays' values. Vectors without any are not read: they may hold anything.
+  HWY_INLINE Interval interval(const float* values) const {
+    const DN d;
+    constexpr size_t kLanes = hn::MaxLanes(DN());
+    VN lo = hn::Set(d, kInf), hi = hn::Set(d, -kInf);
+    for (size_t i = 0; i < kBundle; i += kLanes) {
+      const uint64_t bits = b_.active >> i & ((uint64_t{1} << kLanes) - 1);
+      if (bits == 0) continue;
+      const uint8_t bytes[8] = {static_cast<uint8_t>(bits), static_cast<uint8_t>(bits >> 8)};
+      const auto active = hn::LoadMaskBits(d, bytes);
+      const VN v = hn::Load(d, values + i);
+      lo = hn::Min(lo, hn::IfThenElse(active, v, lo)), hi = hn::Max(hi, hn::IfThenElse(active, v, hi));
+    }
+    return {hn::GetLane(hn::MinOfLanes(d, lo)), hn::GetLane(hn::MaxOfLanes(d, hi))};
+  }
+
   HWY_INLINE Ray ray(int i) const {
     Ray r;
     if constexpr (kSun)
@@ -758,29 +775,36 @@ HWY_NOINLINE void points_of(const TraceScene& scene, const Vec3f& light, const f
   for (size_t begin = 0; begin < n; begin += kBundle) {
     const size_t count = std::min(kBundle, n - begin);
     b.active = 0;
-    for (size_t i = 0; i < kBundle; ++i) {
-      const size_t at = begin + std::min(i, count - 1);
-      const Vec3f p{px[at], py[at], pz[at]};
-      const Vec3f dir = p - light;
-      const float sum = kSun ? (p.x + p.y + p.z) * 0.0f : (dir.x + dir.y + dir.z) * 0.0f;
-      const bool there = i < count && sum == 0.0f && (kSun || !(dir == Vec3f{}));
-      if (there) b.active |= uint64_t{1} << i;
-      for (int axis = 0; axis < 3; ++axis) {
-        if constexpr (kSun)
-          b.o[axis][i] = p[axis];
-        else
-          b.d[axis][i] = dir[axis];
-      }
-    }
-    if constexpr (!kSun) {
-      const DN d;
-      const VN tiny = hn::Set(d, 1e-18f);
-      for (int axis = 0; axis < 3; ++axis)
-        for (size_t i = 0; i < kBundle; i += hn::Lanes(d)) {
-          const VN dir = hn::Load(d, b.d[axis] + i);
-          const VN safe = hn::IfThenElse(hn::Lt(hn::Abs(dir), tiny), hn::Or(tiny, hn::And(dir, hn::SignBit(d))), dir);
+    const DN d;
+    constexpr size_t kLanes = hn::MaxLanes(DN());
+    const VN zero = hn::Zero(d), tiny = hn::Set(d, 1e-18f);
+    for (size_t i = 0; i < count; i += kLanes) {
+      const size_t here = std::min(kLanes, count - i);
+      const auto there = hn::FirstN(d, here);
+      VN p[3];
+      if (here == kLanes)
+        p[0] = hn::LoadU(d, px + begin + i), p[1] = hn::LoadU(d, py + begin + i), p[2] = hn::LoadU(d, pz + begin + i);
+      else
+        p[0] = hn::MaskedLoad(there, d, px + begin + i), p[1] = hn::MaskedLoad(there, d, py + begin + i),
+        p[2] = hn::MaskedLoad(there, d, pz + begin + i);
+      if constexpr (!kSun) {
+        for (int axis = 0; axis < 3; ++axis) {
+          p[axis] = hn::Sub(p[axis], hn::Set(d, light[axis]));
+          const VN safe =
+              hn::IfThenElse(hn::Lt(hn::Abs(p[axis]), tiny), hn::Or(tiny, hn::And(p[axis], hn::SignBit(d))), p[axis]);
+          hn::Store(p[axis], d, b.d[axis] + i);
           hn::Store(hn::Div(hn::Set(d, 1.0f), safe), d, b.r[axis] + i);
         }
+      } else {
+        for (int axis = 0; axis < 3; ++axis) hn::Store(p[axis], d, b.o[axis] + i);
+      }
+      // Zero times anything that is not finite is not zero; a segment without length meets nothing.
+      auto sound = hn::And(there, hn::Eq(hn::Mul(hn::Add(p[0], hn::Add(p[1], p[2])), zero), zero));
+      if constexpr (!kSun) {
+        const VN length = hn::Max(hn::Abs(p[0]), hn::Max(hn::Abs(p[1]), hn::Abs(p[2])));
+        sound = hn::And(sound, hn::Gt(length, zero));
+      }
+      b.active |= static_cast<uint64_t>(bits_of(d, sound)) << i;
     }
     const uint64_t stopped = b.active == 0 ? 0 : BundleTracer<C, kSun>(scene, b).run(*scene.top);
     for (size_t i = 0; i < count; ++i) occluded[begin + i] = static_cast<uint8_t>((stopped >> i) & 1);

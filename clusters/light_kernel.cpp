@@ -4,26 +4,11 @@
 #define HWY_TARGET_INCLUDE "clusters/light_kernel.cpp"
 #include "hwy/foreach_target.h"  // compiles this file once a target; before highway.h
 
-#include "hwy/highway.h"
-
-#include "hwy/contrib/math/math-inl.h"
+#include "clusters/light_kernel-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
-
-using D = hn::CappedTag<float, kLanes>;
-using V = hn::Vec<D>;
-
-struct V3 {
-  V x, y, z;
-};
-
-HWY_INLINE V Dot(const V3& a, const V3& b) { return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, hn::Mul(a.x, b.x))); }
-HWY_INLINE V3 Load3(D d, const std::vector<float> (&a)[3], size_t i) {
-  return {hn::LoadU(d, a[0].data() + i), hn::LoadU(d, a[1].data() + i), hn::LoadU(d, a[2].data() + i)};
-}
-HWY_INLINE V3 Set3(D d, const Vec3f& v) { return {hn::Set(d, v.x), hn::Set(d, v.y), hn::Set(d, v.z)}; }
 
 template <VplKind kKind, bool kGlossy>
 HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
@@ -31,64 +16,22 @@ HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, co
   const D d;
   const size_t lanes = hn::Lanes(d);
   const V zero = hn::Zero(d);
-  const V3 light_position = Set3(d, light.position), light_normal = Set3(d, light.normal);
-  const V vclamp2 = hn::Set(d, clamp2), tiny = hn::Set(d, 1e-30f);
   size_t kept = 0;
   for (size_t i = 0; i < count; i += lanes) {
     const size_t p = first + i;
     // Points past the end are copies of the last one: they are lit too, but not kept.
     auto inside = hn::FirstN(d, std::min(lanes, count - i));
     if (wanted != nullptr) {
-      const uint32_t bits = static_cast<uint32_t>(wanted[i / kLanes]) >> (i % kLanes);
-      if ((bits & ((1u << lanes) - 1)) == 0) continue;
-      const uint8_t bytes[8] = {static_cast<uint8_t>(bits), static_cast<uint8_t>(bits >> 8)};
-      inside = hn::And(inside, hn::LoadMaskBits(d, bytes));
+      const uint32_t bits = wanted[i / kLanes];
+      if ((bits >> (i % kLanes) & ((1u << lanes) - 1)) == 0) continue;
+      inside = hn::And(inside, MaskOf(d, bits, i % kLanes));
     }
-    const V3 position = Load3(d, points.position, p), normal = Load3(d, points.normal, p);
-    V3 to_light;  // unit
-    V geometry;
-    if constexpr (kKind == VplKind::directional) {
-      to_light = {hn::Neg(light_normal.x), hn::Neg(light_normal.y), hn::Neg(light_normal.z)};
-      geometry = hn::Set(d, 1.0f);
-    } else {
-      const V3 v{hn::Sub(light_position.x, position.x), hn::Sub(light_position.y, position.y),
-                 hn::Sub(light_position.z, position.z)};
-      const V dist2 = hn::Max(Dot(v, v), tiny);
-      const V inverse = hn::Div(hn::Set(d, 1.0f), hn::Sqrt(dist2));
-      to_light = {hn::Mul(v.x, inverse), hn::Mul(v.y, inverse), hn::Mul(v.z, inverse)};
-      geometry = hn::Div(hn::Set(d, 1.0f), hn::Max(dist2, vclamp2));
-      if constexpr (kKind == VplKind::oriented) {
-        geometry = hn::Mul(geometry, hn::Max(zero, hn::Neg(Dot(light_normal, to_light))));
-      } else if constexpr (kKind == VplKind::spot) {  // twin of spot_profile in vpl/vpl.h
-        const V c = hn::Neg(Dot(light_normal, to_light)), one = hn::Set(d, 1.0f);
-        const V outer = hn::Set(d, light.cos_outer);
-        V x = light.blend_cosine > 0.0f ? hn::Mul(hn::Sub(c, outer), hn::Set(d, 1.0f / light.blend_cosine))
-                                        : hn::IfThenElse(hn::Gt(c, outer), one, zero);
-        x = hn::Min(one, hn::Max(zero, x));
-        x = hn::Mul(hn::Mul(x, x), hn::NegMulAdd(hn::Set(d, 2.0f), x, hn::Set(d, 3.0f)));
-        if (light.spot_cosine > 0.0f) x = hn::Mul(x, hn::Max(zero, c));
-        if (light.spread_tan > 0.0f) {
-          const V sine = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(c, c, one)));
-          const V slope = hn::Div(hn::Mul(hn::Set(d, light.spread_tan), sine), hn::Max(c, hn::Set(d, 1e-6f)));
-          x = hn::Mul(x, hn::Max(zero, hn::Sub(one, slope)));
-        }
-        geometry = hn::Mul(geometry, x);
-      }
-    }
-    geometry = hn::Mul(geometry, hn::Max(zero, Dot(normal, to_light)));
+    const V3 position = Load3(d, points.position, p);
+    V3 to_light;
+    const V geometry = Geometry<kKind>(d, light, clamp2, position, Load3(d, points.normal, p), to_light);
     const auto reached = hn::And(hn::Gt(geometry, zero), inside);
     if (hn::AllFalse(d, reached)) continue;
-
-    V3 f = Load3(d, points.diffuse, p);
-    if constexpr (kGlossy) {
-      const V3 specular = Load3(d, points.specular, p);
-      const V cosine = Dot(Load3(d, points.mirror, p), to_light);
-      const V n = hn::LoadU(d, points.shininess.data() + p);
-      const V base = hn::Min(hn::Max(cosine, hn::Set(d, 1e-20f)), hn::Set(d, 1.0f));
-      V lobe = hn::Exp(d, hn::Max(hn::Mul(n, hn::Log(d, base)), hn::Set(d, -80.0f)));
-      lobe = hn::IfThenElseZero(hn::Gt(cosine, zero), lobe);
-      f = {hn::MulAdd(specular.x, lobe, f.x), hn::MulAdd(specular.y, lobe, f.y), hn::MulAdd(specular.z, lobe, f.z)};
-    }
+    const V3 f = Reflectance<kGlossy>(d, points, p, to_light);
     const V r = hn::Mul(hn::Mul(f.x, geometry), hn::Set(d, intensity.x));
     const V g = hn::Mul(hn::Mul(f.y, geometry), hn::Set(d, intensity.y));
     const V b = hn::Mul(hn::Mul(f.z, geometry), hn::Set(d, intensity.z));

@@ -1,0 +1,50 @@
+// Vectors of kLanes points in Highway's types, and masks as bits.
+// Compiled once a target: included again by each pass of foreach_target.h.
+#if defined(LUMICUT_CLUSTERS_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef LUMICUT_CLUSTERS_LANES_INL_H_
+#undef LUMICUT_CLUSTERS_LANES_INL_H_
+#else
+#define LUMICUT_CLUSTERS_LANES_INL_H_
+#endif
+
+#include "core/vec.h"
+#include "hwy/highway.h"
+#include "scene/shade_points.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace lumicut::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using D = hn::CappedTag<float, kLanes>;
+using V = hn::Vec<D>;
+
+struct V3 {
+  V x, y, z;
+};
+
+HWY_INLINE V Dot(const V3& a, const V3& b) { return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, hn::Mul(a.x, b.x))); }
+HWY_INLINE V3 Load3(D d, const float (&a)[3][kLanes], size_t i) {
+  return {hn::Load(d, a[0] + i), hn::Load(d, a[1] + i), hn::Load(d, a[2] + i)};
+}
+HWY_INLINE V3 Set3(D d, const Vec3f& v) { return {hn::Set(d, v.x), hn::Set(d, v.y), hn::Set(d, v.z)}; }
+HWY_INLINE V3 Load3(D d, const std::vector<float> (&a)[3], size_t i) {
+  return {hn::LoadU(d, a[0].data() + i), hn::LoadU(d, a[1].data() + i), hn::LoadU(d, a[2].data() + i)};
+}
+HWY_INLINE V Load1(D d, const float (&a)[kLanes], size_t i) { return hn::Load(d, a + i); }
+HWY_INLINE V Load1(D d, const std::vector<float>& a, size_t i) { return hn::LoadU(d, a.data() + i); }
+
+// Bits [i, i + Lanes(d)) of `bits`, and back.
+HWY_INLINE hn::Mask<D> MaskOf(D d, uint32_t bits, size_t i) {
+  const uint8_t bytes[8] = {static_cast<uint8_t>(bits >> i), static_cast<uint8_t>(bits >> i >> 8)};
+  return hn::LoadMaskBits(d, bytes);
+}
+HWY_INLINE uint32_t BitsOf(D d, hn::Mask<D> mask, size_t i) {
+  uint8_t bytes[8] = {};
+  hn::StoreMaskBits(d, mask, bytes);
+  return (bytes[0] | static_cast<uint32_t>(bytes[1]) << 8) << i;
+}
+
+}  // namespace lumicut::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,262 @@
+// Departs from Walter et al.: kCutPoints neighbouring points descend together, so that a bound is a SIMD evaluation and
+// the shadow rays to a representative are one bundle. docs/decisions/0002-packet-lightcuts.md
+#include "clusters/light_cuts.h"
+
+#include <algorithm>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "clusters/light_cuts.cpp"
+#include "hwy/foreach_target.h"  // compiles this file once a target; before highway.h
+
+#include "clusters/bounds-inl.h"
+#include "clusters/light_kernel-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace lumicut::HWY_NAMESPACE {
+
+using DU = hn::RebindToUnsigned<D>;
+
+HWY_INLINE V LuminanceOf(D d, V r, V g, V b) {
+  return hn::MulAdd(hn::Set(d, 0.0722f), b, hn::MulAdd(hn::Set(d, 0.7152f), g, hn::Mul(hn::Set(d, 0.2126f), r)));
+}
+
+HWY_INLINE void Increment(D d, hn::Mask<D> mask, uint32_t* counts) {
+  const DU du;
+  const auto one = hn::IfThenElseZero(hn::RebindMask(du, mask), hn::Set(du, 1));
+  hn::Store(hn::Add(hn::Load(du, counts), one), du, counts);
+  (void)d;
+}
+
+// Unshadowed estimates of the points in `active`, and which of them get any.
+template <VplKind kKind, bool kGlossy>
+HWY_INLINE uint32_t Estimate(const Vpl& light, const Rgb& intensity, float clamp2, const PointBlock& block,
+                             uint32_t active, float* r, float* g, float* b) {
+  const D d;
+  uint32_t lit = 0;
+  for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
+    V3 to_light;
+    const V geometry =
+        Geometry<kKind>(d, light, clamp2, Load3(d, block.position, i), Load3(d, block.normal, i), to_light);
+    const auto reached = hn::And(hn::Gt(geometry, hn::Zero(d)), MaskOf(d, active, i));
+    const V3 f = Reflectance<kGlossy>(d, block, i, to_light);
+    const V cr = hn::IfThenElseZero(reached, hn::Mul(hn::Mul(f.x, geometry), hn::Set(d, intensity.x)));
+    const V cg = hn::IfThenElseZero(reached, hn::Mul(hn::Mul(f.y, geometry), hn::Set(d, intensity.y)));
+    const V cb = hn::IfThenElseZero(reached, hn::Mul(hn::Mul(f.z, geometry), hn::Set(d, intensity.z)));
+    hn::Store(cr, d, r + i), hn::Store(cg, d, g + i), hn::Store(cb, d, b + i);
+    lit |= BitsOf(d, hn::Gt(hn::Add(cr, hn::Add(cg, cb)), hn::Zero(d)), i);
+  }
+  return lit;
+}
+
+template <VplKind kKind>
+HWY_INLINE uint32_t EstimateOfKind(const Vpl& light, const Rgb& intensity, float clamp2, const PointBlock& block,
+                                   uint32_t active, float* r, float* g, float* b) {
+  return block.glossy ? Estimate<kKind, true>(light, intensity, clamp2, block, active, r, g, b)
+                      : Estimate<kKind, false>(light, intensity, clamp2, block, active, r, g, b);
+}
+
+HWY_NOINLINE uint32_t EstimateOf(const Vpl& light, const Rgb& intensity, float clamp2, const PointBlock& block,
+                                 uint32_t active, float* r, float* g, float* b) {
+  switch (light.kind) {
+    case VplKind::omni:
+      return EstimateOfKind<VplKind::omni>(light, intensity, clamp2, block, active, r, g, b);
+    case VplKind::oriented:
+      return EstimateOfKind<VplKind::oriented>(light, intensity, clamp2, block, active, r, g, b);
+    case VplKind::directional:
+      return EstimateOfKind<VplKind::directional>(light, intensity, clamp2, block, active, r, g, b);
+    case VplKind::spot:
+      return EstimateOfKind<VplKind::spot>(light, intensity, clamp2, block, active, r, g, b);
+  }
+  return 0;
+}
+
+// Traces the shadow rays of a new representative; what is hidden adds nothing.
+HWY_INLINE void TraceEstimates(const Accel& accel, const Vpl& light, const Rgb& intensity, float clamp2, CutEntry& e,
+                               LightCuts& cuts) {
+  const D d;
+  uint32_t lit[kCutGroups] = {};
+  size_t n = 0;
+  for (size_t g = 0; g < kCutGroups; ++g) {
+    if (e.active[g] == 0) continue;
+    const PointBlock& block = cuts.blocks[g];
+    lit[g] =
+        EstimateOf(light, intensity, clamp2, block, e.active[g], e.estimate[0][g], e.estimate[1][g], e.estimate[2][g]);
+    if (lit[g] == 0) continue;
+    for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
+      const auto mask = MaskOf(d, lit[g], i);
+      // Through a register: compressing into memory is microcode on Zen 4. The arrays have room for a whole vector.
+      hn::StoreU(hn::Compress(hn::Load(d, block.position[0] + i), mask), d, cuts.x + n);
+      hn::StoreU(hn::Compress(hn::Load(d, block.position[1] + i), mask), d, cuts.y + n);
+      hn::StoreU(hn::Compress(hn::Load(d, block.position[2] + i), mask), d, cuts.z + n);
+      n += hn::CountTrue(d, mask);
+      Increment(d, mask, cuts.rays[g] + i);
+    }
+  }
+  if (n == 0) return;
+  const bool directional = light.kind == VplKind::directional;
+  accel.occluded_from_point(directional ? -light.normal : light.position, directional, cuts.x, cuts.y, cuts.z, n,
+                            cuts.occluded);
+  const uint8_t* occluded = cuts.occluded;
+  for (size_t g = 0; g < kCutGroups; ++g) {
+    if (lit[g] == 0) continue;
+    uint32_t visible = lit[g];
+    for (uint32_t m = lit[g]; m != 0; m &= m - 1)
+      if (*occluded++ != 0) visible &= ~(m & (~m + 1));
+    if (visible == lit[g]) continue;
+    for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
+      const auto mask = MaskOf(d, visible, i);
+      for (auto& channel : e.estimate)
+        hn::Store(hn::IfThenElseZero(mask, hn::Load(d, channel[g] + i)), d, channel[g] + i);
+    }
+  }
+}
+
+// Puts a node into the cuts of the points in `active`. `parent`: its parent's entry, or nullptr.
+void AddNode(const LightTree& tree, const Accel& accel, const CutOptions& o, uint32_t node_index,
+             const uint16_t* active, const CutEntry* parent, LightCuts& cuts) {
+  const D d;
+  const V zero = hn::Zero(d);
+  const LightNode& node = tree.node(node_index);
+  const uint32_t index = cuts.allocate();
+  CutEntry& e = cuts.entry(index);
+  e.node = node_index;
+  uint32_t any = 0;
+  for (size_t g = 0; g < kCutGroups; ++g) {
+    e.active[g] = 0;
+    if (active[g] == 0) continue;
+    NodeBounds(node, cuts.blocks[g], o.clamp2, e.bound[g]);
+    uint32_t reached = 0;
+    for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
+      const auto asked = MaskOf(d, active[g], i);
+      Increment(d, asked, cuts.bounds[g] + i);
+      reached |= BitsOf(d, hn::And(asked, hn::Gt(hn::Load(d, e.bound[g] + i), zero)), i);
+    }
+    e.active[g] = static_cast<uint16_t>(reached);
+    any |= reached;
+  }
+  if (any == 0) return cuts.release(index);
+
+  const uint32_t rep = tree.representative(node_index, o.slot);
+  if (parent != nullptr && tree.representative(parent->node, o.slot) == rep) {
+    // The same light at another intensity: its estimates and shadows are known.
+    const Rgb& whole = tree.node(parent->node).intensity;
+    for (size_t k = 0; k < 3; ++k) {
+      const V share = hn::Set(d, whole[static_cast<int>(k)] > 0.0f
+                                     ? node.intensity[static_cast<int>(k)] / whole[static_cast<int>(k)]
+                                     : 0.0f);
+      for (size_t g = 0; g < kCutGroups; ++g)
+        for (size_t i = 0; e.active[g] != 0 && i < kLanes; i += hn::Lanes(d))
+          hn::Store(
+              hn::IfThenElseZero(MaskOf(d, e.active[g], i), hn::Mul(hn::Load(d, parent->estimate[k][g] + i), share)), d,
+              e.estimate[k][g] + i);
+    }
+  } else {
+    TraceEstimates(accel, tree.lights()[rep], node.intensity, o.clamp2, e, cuts);
+  }
+
+  V excess = zero;
+  const bool leaf = node.leaf();  // exact
+  for (size_t g = 0; g < kCutGroups; ++g) {
+    if (e.active[g] == 0) continue;
+    for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
+      const auto mask = MaskOf(d, e.active[g], i);
+      const V r = hn::Load(d, e.estimate[0][g] + i), gr = hn::Load(d, e.estimate[1][g] + i),
+              b = hn::Load(d, e.estimate[2][g] + i);
+      const V total = hn::Add(hn::Load(d, cuts.luminance[g] + i), LuminanceOf(d, r, gr, b));
+      hn::Store(total, d, cuts.luminance[g] + i);
+      Increment(d, mask, cuts.clusters[g] + i);
+      if (leaf) {
+        hn::Store(hn::Add(hn::Load(d, cuts.radiance[0][g] + i), r), d, cuts.radiance[0][g] + i);
+        hn::Store(hn::Add(hn::Load(d, cuts.radiance[1][g] + i), gr), d, cuts.radiance[1][g] + i);
+        hn::Store(hn::Add(hn::Load(d, cuts.radiance[2][g] + i), b), d, cuts.radiance[2][g] + i);
+      } else {
+        const V ratio = hn::Div(hn::Load(d, e.bound[g] + i), hn::Max(total, hn::Set(d, 1e-30f)));
+        excess = hn::Max(excess, hn::IfThenElseZero(mask, ratio));
+      }
+    }
+  }
+  if (leaf) return cuts.release(index);
+  cuts.heap.push_back({hn::GetLane(hn::MaxOfLanes(d, excess)), index});
+  std::push_heap(cuts.heap.begin(), cuts.heap.end());
+}
+
+void GrowCuts(const LightTree& tree, const Accel& accel, const CutOptions& o, size_t count, LightCuts& cuts) {
+  const D d;
+  const DU du;
+  const V zero = hn::Zero(d), error = hn::Set(d, o.error);
+  uint16_t all[kCutGroups];
+  for (size_t g = 0; g < kCutGroups; ++g) {
+    const size_t in_group = count > g * kLanes ? std::min(kLanes, count - g * kLanes) : 0;
+    all[g] = static_cast<uint16_t>((1u << in_group) - 1);
+  }
+  for (const uint32_t root : tree.roots()) AddNode(tree, accel, o, root, all, nullptr, cuts);
+  while (!cuts.heap.empty()) {
+    std::pop_heap(cuts.heap.begin(), cuts.heap.end());
+    const uint32_t index = cuts.heap.back().entry;
+    cuts.heap.pop_back();
+    const CutEntry& e = cuts.entry(index);
+    uint16_t refine[kCutGroups] = {};
+    uint32_t any = 0;
+    for (size_t g = 0; g < kCutGroups; ++g) {
+      if (e.active[g] == 0) continue;
+      uint32_t bits = 0;
+      for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
+        const auto active = MaskOf(d, e.active[g], i);
+        const V total = hn::Load(d, cuts.luminance[g] + i);
+        const auto cut = hn::Load(du, cuts.clusters[g] + i);
+        auto wanted = hn::And(active, hn::Gt(hn::Load(d, e.bound[g] + i), hn::Mul(error, total)));
+        wanted = hn::And(wanted, hn::RebindMask(d, hn::Lt(cut, hn::Set(du, o.max_cut))));
+        const V est[3] = {hn::Load(d, e.estimate[0][g] + i), hn::Load(d, e.estimate[1][g] + i),
+                          hn::Load(d, e.estimate[2][g] + i)};
+        // In the cuts of the other points the cluster stays for good.
+        for (size_t k = 0; k < 3; ++k)
+          hn::Store(hn::Add(hn::Load(d, cuts.radiance[k][g] + i), hn::IfThenZeroElse(wanted, est[k])), d,
+                    cuts.radiance[k][g] + i);
+        const V rest = hn::Max(zero, hn::Sub(total, LuminanceOf(d, est[0], est[1], est[2])));
+        hn::Store(hn::IfThenElse(wanted, rest, total), d, cuts.luminance[g] + i);
+        const auto one = hn::IfThenElseZero(hn::RebindMask(du, wanted), hn::Set(du, 1));
+        hn::Store(hn::Sub(cut, one), du, cuts.clusters[g] + i);
+        bits |= BitsOf(d, wanted, i);
+      }
+      refine[g] = static_cast<uint16_t>(bits);
+      any |= bits;
+    }
+    if (any != 0) {
+      const uint32_t child = tree.node(e.node).first_child;
+      AddNode(tree, accel, o, child, refine, &e, cuts);
+      AddNode(tree, accel, o, child + 1, refine, &e, cuts);
+    }
+    cuts.release(index);
+  }
+}
+
+}  // namespace lumicut::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace lumicut {
+HWY_EXPORT(GrowCuts);
+
+uint32_t LightCuts::allocate() {
+  if (!free_.empty()) {
+    const uint32_t i = free_.back();
+    free_.pop_back();
+    return i;
+  }
+  if (used_ / kChunk >= chunks_.size()) chunks_.push_back(std::make_unique<CutEntry[]>(kChunk));
+  return used_++;
+}
+
+void LightCuts::grow(const LightTree& tree, const Accel& accel, const CutOptions& options, const ShadePoints& points,
+                     size_t first, size_t count) {
+  free_.clear();
+  used_ = 0;
+  for (size_t g = 0; g * kLanes < count; ++g) blocks[g].load(points, first + g * kLanes);
+  const auto clear = [](auto& array) { std::fill_n(&array[0][0], sizeof(array) / sizeof(array[0][0]), 0); };
+  for (auto& channel : radiance) clear(channel);
+  clear(clusters), clear(rays), clear(bounds), clear(luminance);
+  HWY_DYNAMIC_DISPATCH(GrowCuts)(tree, accel, options, count, *this);
+}
+
+}  // namespace lumicut
+#endif
