@@ -48,49 +48,25 @@ class Batch {
 
   // Camera rays → points.
   void collect() {
-    const uint32_t samples = options_.samples;
+    const size_t samples = options_.samples;
     sums_.resize(pixels_.size());
-    rays_.resize(pixels_.size() * samples);
-    std::vector<float> cosines(rays_.size());
-    for (size_t p = 0; p < pixels_.size(); ++p) {
-      const auto [x, y] = pixels_[p];
-      Rng rng(options_.seed, Stage::camera, x, y);
-      // One sample lies at the centre; more are shifted by a random vector of the pixel's own.
-      const Vec2f shift = samples == 1 ? Vec2f{0, 0} : Vec2f{rng.next_float(), rng.next_float()};
-      const Vec2f lens_shift = {rng.next_float(), rng.next_float()};
-      for (uint32_t s = 0; s < samples; ++s) {
-        const Vec2f at = r2(s, shift), lens = r2(s, lens_shift);
-        const Camera::Sample c = scene_.camera().generate(static_cast<float>(x) + at.x, static_cast<float>(y) + at.y,
-                                                          static_cast<float>(options_.width),
-                                                          static_cast<float>(options_.height), lens.x, lens.y);
-        RayHit& r = rays_[p * samples + s];
-        r.ray.org = c.origin, r.ray.dir = c.direction, r.ray.tnear = c.tnear, r.ray.tfar = c.tfar;
-        cosines[p * samples + s] = c.forward_cosine;
+    std::vector<SurfacePoint> found(pixels_.size() * samples);
+    std::vector<uint8_t> hit(found.size(), 0);
+    parallel_chunks(pixels_.size(), std::max<size_t>(1, 1024 / samples), [&](size_t begin, size_t end) {
+      std::vector<RayHit> rays((end - begin) * samples);
+      std::vector<float> cosines(rays.size());
+      for (size_t p = begin; p < end; ++p)
+        camera_rays(p, rays.data() + (p - begin) * samples, cosines.data() + (p - begin) * samples);
+      if (!scene_.bounds().empty()) scene_.accel().intersect(rays);
+      for (size_t i = 0; i < rays.size(); ++i) {
+        const size_t p = begin + i / samples;
+        hit[begin * samples + i] = first_hit(rays[i], p, cosines[i], found[begin * samples + i]);
       }
-    }
-    if (!scene_.bounds().empty()) scene_.accel().intersect(rays_);
-    points_.reserve(rays_.size());
-    for (size_t i = 0; i < rays_.size(); ++i) {
-      const size_t p = i / samples;
-      const Vec3f to_viewer = -rays_[i].ray.dir;
-      if (rays_[i].hit.geom == kNoId) {
-        sums_[p].radiance += scene_.environment_radiance(rays_[i].ray.dir);
-        continue;
-      }
-      const SurfaceHit surface = scene_.surface(rays_[i]);
-      const SurfacePoint point = scene_.shade_point(surface, to_viewer, static_cast<uint32_t>(p));
-      points_.push(point);
-      PixelSums& sum = sums_[p];
-      sum.radiance += scene_.emitted(surface, to_viewer);
-      sum.normal += point.normal;
-      sum.albedo +=
-          min(scene_.diffuse_color(surface.material, surface.uv) + scene_.specular_color(surface.material, surface.uv),
-              Rgb{1, 1, 1});
-      if (sum.hits == 0.0f) sum.position = surface.position, sum.depth = surface.t * cosines[i];
-      sum.hits += 1.0f;
-    }
+    });
+    points_.reserve(found.size());
+    for (size_t i = 0; i < found.size(); ++i)
+      if (hit[i] != 0) points_.push(found[i]);
     points_.finish();
-    rays_ = {};
   }
 
   void shade(const Integrator& integrator, ShadeContext context) {
@@ -128,6 +104,42 @@ class Batch {
   size_t pixel_count() const { return pixels_.size(); }
 
  private:
+  void camera_rays(size_t p, RayHit* rays, float* cosines) const {
+    const auto [x, y] = pixels_[p];
+    Rng rng(options_.seed, Stage::camera, x, y);
+    // One sample lies at the centre; more are shifted by a random vector of the pixel's own.
+    const Vec2f shift = options_.samples == 1 ? Vec2f{0, 0} : Vec2f{rng.next_float(), rng.next_float()};
+    const Vec2f lens_shift = {rng.next_float(), rng.next_float()};
+    for (uint32_t s = 0; s < options_.samples; ++s) {
+      const Vec2f at = r2(s, shift), lens = r2(s, lens_shift);
+      const Camera::Sample c = scene_.camera().generate(static_cast<float>(x) + at.x, static_cast<float>(y) + at.y,
+                                                        static_cast<float>(options_.width),
+                                                        static_cast<float>(options_.height), lens.x, lens.y);
+      rays[s].ray.org = c.origin, rays[s].ray.dir = c.direction, rays[s].ray.tnear = c.tnear, rays[s].ray.tfar = c.tfar;
+      cosines[s] = c.forward_cosine;
+    }
+  }
+
+  // What the ray found, into the sums of pixel p; false: nothing to shade.
+  bool first_hit(const RayHit& ray, size_t p, float cosine, SurfacePoint& point) {
+    const Vec3f to_viewer = -ray.ray.dir;
+    PixelSums& sum = sums_[p];
+    if (ray.hit.geom == kNoId) {
+      sum.radiance += scene_.environment_radiance(ray.ray.dir);
+      return false;
+    }
+    const SurfaceHit surface = scene_.surface(ray);
+    point = scene_.shade_point(surface, to_viewer, static_cast<uint32_t>(p));
+    sum.radiance += scene_.emitted(surface, to_viewer);
+    sum.normal += point.normal;
+    sum.albedo +=
+        min(scene_.diffuse_color(surface.material, surface.uv) + scene_.specular_color(surface.material, surface.uv),
+            Rgb{1, 1, 1});
+    if (sum.hits == 0.0f) sum.position = surface.position, sum.depth = surface.t * cosine;
+    sum.hits += 1.0f;
+    return true;
+  }
+
   struct Pixel {
     uint32_t x, y;
   };
@@ -136,7 +148,6 @@ class Batch {
   std::vector<Rect> tiles_;
   std::vector<Pixel> pixels_;
   std::vector<PixelSums> sums_;
-  std::vector<RayHit> rays_;
   ShadePoints points_;
   std::vector<Rgb> radiance_;
   std::vector<PointCounts> counts_;
