@@ -76,6 +76,7 @@ HWY_INLINE void TraceEstimates(const Accel& accel, const Vpl& light, const Rgb& 
   const D d;
   uint32_t lit[kCutGroups] = {};
   size_t n = 0;
+  e.lit = 0;
   for (size_t g = 0; g < kCutGroups; ++g) {
     if (e.active[g] == 0) continue;
     const PointBlock& block = cuts.blocks[g];
@@ -102,7 +103,8 @@ HWY_INLINE void TraceEstimates(const Accel& accel, const Vpl& light, const Rgb& 
     uint32_t visible = lit[g];
     for (uint32_t m = lit[g]; m != 0; m &= m - 1)
       if (*occluded++ != 0) visible &= ~(m & (~m + 1));
-    if (visible == lit[g]) continue;
+    if (visible != 0) e.lit |= 1u << g;
+    if (visible == 0 || visible == lit[g]) continue;
     for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
       const auto mask = MaskOf(d, visible, i);
       for (auto& channel : e.estimate)
@@ -119,7 +121,8 @@ void AddNode(const LightTree& tree, const Accel& accel, const CutOptions& o, uin
   const LightNode& node = tree.node(node_index);
   const uint32_t index = cuts.allocate();
   CutEntry& e = cuts.entry(index);
-  e.node = node_index;
+  e.first_child = node.first_child, e.representative = tree.representative(node_index, o.slot);
+  e.intensity = node.intensity;
   uint32_t any = 0;
   for (size_t g = 0; g < kCutGroups; ++g) {
     e.active[g] = 0;
@@ -136,97 +139,127 @@ void AddNode(const LightTree& tree, const Accel& accel, const CutOptions& o, uin
   }
   if (any == 0) return cuts.release(index);
 
-  const uint32_t rep = tree.representative(node_index, o.slot);
-  if (parent != nullptr && tree.representative(parent->node, o.slot) == rep) {
+  if (parent != nullptr && parent->representative == e.representative) {
     // The same light at another intensity: its estimates and shadows are known.
-    const Rgb& whole = tree.node(parent->node).intensity;
+    const Rgb& whole = parent->intensity;
+    e.lit = 0;
+    for (size_t g = 0; g < kCutGroups; ++g)
+      if (e.active[g] != 0) e.lit |= parent->lit & 1u << g;
     for (size_t k = 0; k < 3; ++k) {
       const V share = hn::Set(d, whole[static_cast<int>(k)] > 0.0f
                                      ? node.intensity[static_cast<int>(k)] / whole[static_cast<int>(k)]
                                      : 0.0f);
       for (size_t g = 0; g < kCutGroups; ++g)
-        for (size_t i = 0; e.active[g] != 0 && i < kLanes; i += hn::Lanes(d))
+        for (size_t i = 0; (e.lit >> g & 1) != 0 && i < kLanes; i += hn::Lanes(d))
           hn::Store(
               hn::IfThenElseZero(MaskOf(d, e.active[g], i), hn::Mul(hn::Load(d, parent->estimate[k][g] + i), share)), d,
               e.estimate[k][g] + i);
     }
   } else {
-    TraceEstimates(accel, tree.lights()[rep], node.intensity, o.clamp2, e, cuts);
+    TraceEstimates(accel, tree.lights()[e.representative], node.intensity, o.clamp2, e, cuts);
   }
 
   V excess = zero;
   const bool leaf = node.leaf();  // exact
   for (size_t g = 0; g < kCutGroups; ++g) {
     if (e.active[g] == 0) continue;
+    const bool lit = (e.lit >> g & 1) != 0;
     for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
       const auto mask = MaskOf(d, e.active[g], i);
-      const V r = hn::Load(d, e.estimate[0][g] + i), gr = hn::Load(d, e.estimate[1][g] + i),
-              b = hn::Load(d, e.estimate[2][g] + i);
-      const V total = hn::Add(hn::Load(d, cuts.luminance[g] + i), LuminanceOf(d, r, gr, b));
-      hn::Store(total, d, cuts.luminance[g] + i);
+      V total = hn::Load(d, cuts.luminance[g] + i);
       Increment(d, mask, cuts.clusters[g] + i);
-      if (leaf) {
-        hn::Store(hn::Add(hn::Load(d, cuts.radiance[0][g] + i), r), d, cuts.radiance[0][g] + i);
-        hn::Store(hn::Add(hn::Load(d, cuts.radiance[1][g] + i), gr), d, cuts.radiance[1][g] + i);
-        hn::Store(hn::Add(hn::Load(d, cuts.radiance[2][g] + i), b), d, cuts.radiance[2][g] + i);
-      } else {
-        const V ratio = hn::Div(hn::Load(d, e.bound[g] + i), hn::Max(total, hn::Set(d, 1e-30f)));
-        excess = hn::Max(excess, hn::IfThenElseZero(mask, ratio));
+      if (lit) {
+        const V est[3] = {hn::Load(d, e.estimate[0][g] + i), hn::Load(d, e.estimate[1][g] + i),
+                          hn::Load(d, e.estimate[2][g] + i)};
+        total = hn::Add(total, LuminanceOf(d, est[0], est[1], est[2]));
+        hn::Store(total, d, cuts.luminance[g] + i);
+        for (size_t k = 0; leaf && k < 3; ++k)
+          hn::Store(hn::Add(hn::Load(d, cuts.radiance[k][g] + i), est[k]), d, cuts.radiance[k][g] + i);
       }
+      const V ratio = hn::Div(hn::Load(d, e.bound[g] + i), hn::Max(total, hn::Set(d, 1e-30f)));
+      excess = hn::Max(excess, hn::IfThenElseZero(mask, ratio));
     }
   }
   if (leaf) return cuts.release(index);
-  cuts.heap.push_back({hn::GetLane(hn::MaxOfLanes(d, excess)), index});
-  std::push_heap(cuts.heap.begin(), cuts.heap.end());
+  const float largest = hn::GetLane(hn::MaxOfLanes(d, excess));
+  if (largest > o.error) {
+    cuts.heap.push_back({largest, index});
+    std::push_heap(cuts.heap.begin(), cuts.heap.end());
+  } else {
+    cuts.resting.push_back(index);
+  }
 }
 
-void GrowCuts(const LightTree& tree, const Accel& accel, const CutOptions& o, size_t count, LightCuts& cuts) {
+// Leaves the cluster in the cuts of the points whose share it is within, and refines it in those of the others.
+HWY_INLINE void Refine(const LightTree& tree, const Accel& accel, const CutOptions& o, uint32_t index,
+                       LightCuts& cuts) {
   const D d;
   const DU du;
   const V zero = hn::Zero(d), error = hn::Set(d, o.error);
+  const CutEntry& e = cuts.entry(index);
+  const LightNode* children = &tree.node(e.first_child);
+  __builtin_prefetch(children), __builtin_prefetch(reinterpret_cast<const char*>(children) + 64);
+  __builtin_prefetch(children + 1), __builtin_prefetch(reinterpret_cast<const char*>(children + 1) + 64);
+  uint16_t refine[kCutGroups] = {};
+  uint32_t any = 0;
+  for (size_t g = 0; g < kCutGroups; ++g) {
+    if (e.active[g] == 0) continue;
+    uint32_t bits = 0;
+    for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
+      const V total = hn::Load(d, cuts.luminance[g] + i);
+      const auto cut = hn::Load(du, cuts.clusters[g] + i);
+      auto wanted = hn::And(MaskOf(d, e.active[g], i), hn::Gt(hn::Load(d, e.bound[g] + i), hn::Mul(error, total)));
+      wanted = hn::And(wanted, hn::RebindMask(d, hn::Lt(cut, hn::Set(du, o.max_cut))));
+      const auto one = hn::IfThenElseZero(hn::RebindMask(du, wanted), hn::Set(du, 1));
+      hn::Store(hn::Sub(cut, one), du, cuts.clusters[g] + i);
+      bits |= BitsOf(d, wanted, i);
+      if ((e.lit >> g & 1) == 0) continue;
+      const V est[3] = {hn::Load(d, e.estimate[0][g] + i), hn::Load(d, e.estimate[1][g] + i),
+                        hn::Load(d, e.estimate[2][g] + i)};
+      for (size_t k = 0; k < 3; ++k)
+        hn::Store(hn::Add(hn::Load(d, cuts.radiance[k][g] + i), hn::IfThenZeroElse(wanted, est[k])), d,
+                  cuts.radiance[k][g] + i);
+      const V rest = hn::Max(zero, hn::Sub(total, LuminanceOf(d, est[0], est[1], est[2])));
+      hn::Store(hn::IfThenElse(wanted, rest, total), d, cuts.luminance[g] + i);
+    }
+    refine[g] = static_cast<uint16_t>(bits);
+    any |= bits;
+  }
+  if (any != 0) {
+    AddNode(tree, accel, o, e.first_child, refine, &e, cuts);
+    AddNode(tree, accel, o, e.first_child + 1, refine, &e, cuts);
+  }
+  cuts.release(index);
+}
+
+// Cuts of many clusters outgrow the caches.
+HWY_INLINE void Prefetch(const CutEntry& e) {
+  __builtin_prefetch(&e);
+  for (const auto& group : e.bound) __builtin_prefetch(group);
+}
+
+void GrowCuts(const LightTree& tree, const Accel& accel, const CutOptions& o, size_t count, LightCuts& cuts) {
   uint16_t all[kCutGroups];
   for (size_t g = 0; g < kCutGroups; ++g) {
     const size_t in_group = count > g * kLanes ? std::min(kLanes, count - g * kLanes) : 0;
     all[g] = static_cast<uint16_t>((1u << in_group) - 1);
   }
   for (const uint32_t root : tree.roots()) AddNode(tree, accel, o, root, all, nullptr, cuts);
-  while (!cuts.heap.empty()) {
-    std::pop_heap(cuts.heap.begin(), cuts.heap.end());
-    const uint32_t index = cuts.heap.back().entry;
-    cuts.heap.pop_back();
-    const CutEntry& e = cuts.entry(index);
-    uint16_t refine[kCutGroups] = {};
-    uint32_t any = 0;
-    for (size_t g = 0; g < kCutGroups; ++g) {
-      if (e.active[g] == 0) continue;
-      uint32_t bits = 0;
-      for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
-        const auto active = MaskOf(d, e.active[g], i);
-        const V total = hn::Load(d, cuts.luminance[g] + i);
-        const auto cut = hn::Load(du, cuts.clusters[g] + i);
-        auto wanted = hn::And(active, hn::Gt(hn::Load(d, e.bound[g] + i), hn::Mul(error, total)));
-        wanted = hn::And(wanted, hn::RebindMask(d, hn::Lt(cut, hn::Set(du, o.max_cut))));
-        const V est[3] = {hn::Load(d, e.estimate[0][g] + i), hn::Load(d, e.estimate[1][g] + i),
-                          hn::Load(d, e.estimate[2][g] + i)};
-        // In the cuts of the other points the cluster stays for good.
-        for (size_t k = 0; k < 3; ++k)
-          hn::Store(hn::Add(hn::Load(d, cuts.radiance[k][g] + i), hn::IfThenZeroElse(wanted, est[k])), d,
-                    cuts.radiance[k][g] + i);
-        const V rest = hn::Max(zero, hn::Sub(total, LuminanceOf(d, est[0], est[1], est[2])));
-        hn::Store(hn::IfThenElse(wanted, rest, total), d, cuts.luminance[g] + i);
-        const auto one = hn::IfThenElseZero(hn::RebindMask(du, wanted), hn::Set(du, 1));
-        hn::Store(hn::Sub(cut, one), du, cuts.clusters[g] + i);
-        bits |= BitsOf(d, wanted, i);
-      }
-      refine[g] = static_cast<uint16_t>(bits);
-      any |= bits;
+  std::vector<uint32_t>& resting = cuts.resting;
+  for (;;) {
+    while (!cuts.heap.empty()) {
+      std::pop_heap(cuts.heap.begin(), cuts.heap.end());
+      const uint32_t index = cuts.heap.back().entry;
+      cuts.heap.pop_back();
+      if (!cuts.heap.empty()) Prefetch(cuts.entry(cuts.heap.front().entry));
+      Refine(tree, accel, o, index, cuts);
     }
-    if (any != 0) {
-      const uint32_t child = tree.node(e.node).first_child;
-      AddNode(tree, accel, o, child, refine, &e, cuts);
-      AddNode(tree, accel, o, child + 1, refine, &e, cuts);
-    }
-    cuts.release(index);
+    if (resting.empty()) break;
+    // Those that were within the share when they came: radiance may have fallen since.
+    const uint32_t index = resting.back();
+    resting.pop_back();
+    if (!resting.empty()) Prefetch(cuts.entry(resting.back()));
+    Refine(tree, accel, o, index, cuts);
   }
 }
 

@@ -22,10 +22,13 @@ struct CutOptions {
 
 // A cluster in the cuts of the points in `active`.
 struct alignas(64) CutEntry {
-  float bound[kCutGroups][kLanes];
-  float estimate[3][kCutGroups][kLanes];  // radiance, shadows included; 0 at the other points of groups with any
+  // What of the node is needed again, so that the tree's memory is not.
+  uint32_t first_child, representative;
+  Rgb intensity;
   uint16_t active[kCutGroups];
-  uint32_t node;
+  uint32_t lit;  // a bit each group whose estimates are not all 0; those of the others are not even written
+  alignas(64) float bound[kCutGroups][kLanes];
+  float estimate[3][kCutGroups][kLanes];  // radiance, shadows included; 0 at the other points of a group
 };
 
 // Points, their cuts while these grow, and the result. Kept between blocks, so that none allocates.
@@ -46,6 +49,7 @@ struct LightCuts {
     bool operator<(const HeapItem& o) const { return excess < o.excess || (excess == o.excess && entry > o.entry); }
   };
   std::vector<HeapItem> heap;
+  std::vector<uint32_t> resting;  // entries that no point needs refined, as it stood when they were added
   alignas(64) float luminance[kCutGroups][kLanes];                                           // of the cut's estimate
   alignas(64) float x[kCutPoints + kLanes], y[kCutPoints + kLanes], z[kCutPoints + kLanes];  // ends of shadow rays
   uint8_t occluded[kCutPoints + kLanes];
