@@ -9,6 +9,7 @@
 
 #include "io/file_error.h"
 #include "io/json_reader.h"
+#include "tools/bench_references.h"
 
 namespace lumicut::tools {
 
@@ -161,7 +162,8 @@ class PlanReader {
       object.finish();
     }
     for (const BenchScene& other : plan_.scenes)
-      if (other.name == s.name) value.fail(fmt::format("is another scene called \"{}\": give it a \"name\"", s.name));
+      if (file_name_of(other.name) == file_name_of(s.name))
+        value.fail(fmt::format("is another scene called \"{}\": give it a \"name\"", s.name));
     plan_.scenes.push_back(s);
   }
 
@@ -217,7 +219,7 @@ class PlanReader {
     object.finish();
     for (const BenchRun& one : all) {
       for (const BenchRun& other : plan_.runs)
-        if (other.name == one.name)
+        if (file_name_of(other.name) == file_name_of(one.name))
           value.fail(fmt::format("is another run called \"{}\": give it a \"name\"", one.name));
       plan_.runs.push_back(one);
     }
