@@ -31,7 +31,7 @@ namespace {
 constexpr char kFormat[] = "lumicut-bench/1";
 
 struct Options {
-  std::string plan, output = "out/bench", size;
+  std::string plan, output = "out/bench", size, accel;
   std::vector<std::string> scenes, runs, only;
   std::vector<int64_t> vpls, seeds, samples;
   int threads = -1, repeat = 0;
@@ -152,6 +152,7 @@ class BenchCommand {
       plan_ = read_bench_plan(o_.plan, api());
     }
     if (o_.threads >= 0) plan_.threads = o_.threads;
+    if (!o_.accel.empty()) plan_.accel = o_.accel;
     if (o_.repeat > 0) plan_.repeat = o_.repeat;
     std::vector<uint32_t> size;
     if (!o_.size.empty()) {
@@ -591,6 +592,8 @@ void add_bench(CLI::App& app) {
   command->add_option("--repeat", o->repeat, "Times that each run is timed; medians are kept")
       ->check(CLI::Range(1, 1000));
   command->add_option("--threads", o->threads, "Threads, in place of the plan's; 0: all")->check(CLI::Range(0, 4096));
+  command->add_option("--accel", o->accel, "How rays are traced, in place of the plan's")
+      ->check(CLI::IsMember({"embree", "agglomerative"}));
   auto* resume = command->add_flag("--resume", o->resume, "Go on with what stands in the folder");
   command->add_flag("--overwrite", o->overwrite, "Begin anew, though results stand in the folder")->excludes(resume);
   command->add_flag("--check", o->check, "Read the plan and say whether it is good; run nothing");

@@ -60,14 +60,14 @@ std::string scale_html(const std::string& title, const FalseColor& scale, const 
     stops += fmt::format("<stop offset=\"{:.4f}\" stop-color=\"#{:02x}{:02x}{:02x}\"/>", t, c[0], c[1], c[2]);
   }
   std::string out = fmt::format(
-      "<span class=\"scale\"><svg viewBox=\"0 0 320 46\" role=\"img\" aria-label=\"Colours of "
+      "<span class=\"scale\"><svg viewBox=\"0 0 340 46\" role=\"img\" aria-label=\"Colours of "
       "{0}\"><defs><linearGradient "
-      "id=\"{1}\">{2}</linearGradient></defs><text x=\"10\" y=\"11\">{0}</text><rect x=\"10\" y=\"16\" width=\"290\" "
+      "id=\"{1}\">{2}</linearGradient></defs><text x=\"20\" y=\"11\">{0}</text><rect x=\"20\" y=\"16\" width=\"290\" "
       "height=\"12\" fill=\"url(#{1})\"/>",
       html_text(title), id, stops);
   for (const double tick : bar_ticks(scale)) {
     const double t = both ? (tick / scale.high + 1) / 2 : std::log(tick / scale.low) / std::log(scale.high / scale.low);
-    out += fmt::format("<text x=\"{:.1f}\" y=\"41\" text-anchor=\"middle\">{}</text>", 10 + 290 * t,
+    out += fmt::format("<text x=\"{:.1f}\" y=\"41\" text-anchor=\"middle\">{}</text>", 20 + 290 * t,
                        label_text(tick, scale.percent));
   }
   return out + "</svg></span>\n";
@@ -167,8 +167,9 @@ std::string scaling_plots(const ordered_json& results) {
   std::vector<Plot> plots;
   for (const auto* row : complete_rows(results)) {
     if ((*row).at("vpls_requested").get<int64_t>() == 0) continue;
-    const std::string title = fmt::format("{}, {} samples a pixel: render seconds by number of virtual lights",
-                                          (*row).at("scene").get<std::string>(), (*row).at("samples").get<int64_t>());
+    const std::string title = fmt::format("{}, {} sample{} a pixel: render seconds by number of virtual lights",
+                                          (*row).at("scene").get<std::string>(), (*row).at("samples").get<int64_t>(),
+                                          (*row).at("samples") == 1 ? "" : "s");
     auto plot = std::find_if(plots.begin(), plots.end(), [&](const Plot& p) { return p.title == title; });
     if (plot == plots.end()) {
       plots.push_back(
