@@ -1,4 +1,5 @@
 """What tests of the command share: running it, a folder for its files, reading its pictures."""
+import concurrent.futures
 import os
 import pathlib
 import struct
@@ -37,6 +38,12 @@ class Cli(unittest.TestCase):
         self.assertEqual(result.returncode, code, result.stderr)
         for text in texts:
             self.assertIn(text, result.stderr)
+
+
+def together(calls):
+    """Results of calls that wait for processes, a few at a time, in order."""
+    with concurrent.futures.ThreadPoolExecutor(3) as pool:
+        return [future.result() for future in [pool.submit(call) for call in calls]]
 
 
 def wait_until_busy(process, seconds):

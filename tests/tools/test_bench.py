@@ -7,7 +7,7 @@ import subprocess
 import time
 import unittest
 
-from cli import BAD_FILE, COMMAND, FAILED, INTERRUPTED, OK, ROOT, SCENE, USAGE, Cli, lumicut
+from cli import BAD_FILE, COMMAND, FAILED, INTERRUPTED, OK, ROOT, SCENE, USAGE, Cli, lumicut, together
 
 ROOM = ROOT / "reference_images/indirect_room/indirect_room.json"
 SMALL = {"size": [32, 24], "vpls": 200}
@@ -16,8 +16,8 @@ IC = {"name": "IC", "integrator": "illumination_cut", "parameters": {"error": 0.
 
 
 class Bench(Cli):
-    def plan(self, scenes=(str(SCENE),), runs=(LC,), **more):
-        path = self.folder / "plan.json"
+    def plan(self, scenes=(str(SCENE),), runs=(LC,), name="plan.json", **more):
+        path = self.folder / name
         path.write_text(json.dumps({**SMALL, "scenes": list(scenes), "runs": list(runs), **more}))
         return path
 
@@ -170,10 +170,13 @@ class Failures(Bench):
             ({"runs": [LC, {**IC, "match": {**match, "range": [0.1, 10]}}]}, "runs[1].match.range", "error"),
             ({"runs": [LC, {**IC, "match": {**match, "measure": "beauty"}}]}, "runs[1].match.measure", "beauty"),
         ]
-        for change, *texts in wrong:
+        plans = [self.plan(**{"runs": [LC], **change, "name": f"{i}.json"}) for i, (change, *_) in enumerate(wrong)]
+        results = together([lambda plan=plan: lumicut("bench", plan, "-o", self.folder / "out") for plan in plans])
+        for (change, *texts), plan, result in zip(wrong, plans, results):
             with self.subTest(change=change):
-                result = self.bench(self.plan(**{"runs": [LC], **change}), code=BAD_FILE, texts=("plan.json", *texts))
+                self.assert_ends(result, BAD_FILE, plan.name, *texts)
                 self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+            plan.unlink()
         (self.folder / "plan.json").write_text('{\n"scenes": ]')
         self.bench(self.folder / "plan.json", code=BAD_FILE, texts=("plan.json", "line 2"))
         self.bench(self.folder / "none.json", code=BAD_FILE, texts=("none.json",))
@@ -205,9 +208,9 @@ class Failures(Bench):
         self.assertEqual(["failed" in r for r in self.results()["rows"]], [True, False])
 
     def test_an_interrupt_keeps_what_is_finished(self):
-        size = [1500, 1500]
+        size = [640, 640]
         reference = self.folder / "r.exr"
-        self.assert_ends(lumicut("render", SCENE, "-i", "lightcuts", "-p", "error=1", "--vpls", "50", "--size", "1500x1500",
+        self.assert_ends(lumicut("render", SCENE, "-i", "lightcuts", "-p", "error=1", "--vpls", "50", "--size", "640x640",
                                  "--layers", "radiance", "--half", "-o", reference), OK)
         # The second takes minutes: every light of many at every point.
         runs = [{"name": "quick", "integrator": "lightcuts", "parameters": {"error": 1, "max_cut": 2}},
@@ -233,8 +236,8 @@ class Plans(Bench):
     def test_the_plans_of_the_project_are_good(self):
         plans = sorted((ROOT / "bench/plans").glob("*.json"))
         self.assertGreaterEqual(len(plans), 4)
-        for plan in plans:
-            self.assert_ends(lumicut("bench", plan, "--check"), OK)
+        for result in together([lambda plan=plan: lumicut("bench", plan, "--check") for plan in plans]):
+            self.assert_ends(result, OK)
 
 
 if __name__ == "__main__":

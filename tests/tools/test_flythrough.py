@@ -2,15 +2,15 @@
 import json
 import unittest
 
-from cli import BAD_FILE, FAILED, OK, SCENE, USAGE, Cli, lumicut
+from cli import BAD_FILE, FAILED, OK, SCENE, USAGE, Cli, lumicut, together
 
 FRONT = {"eye": [1, 1, 6.6], "at": [1, 1, 0], "fov_y": 24}  # the scene's own
 SIDE = {"eye": [0.4, 1.4, 6], "at": [1, 0.9, 0]}
 
 
 class Flythrough(Cli):
-    def path(self, *cameras, **more):
-        file = self.folder / "path.json"
+    def path(self, *cameras, name="path.json", **more):
+        file = self.folder / name
         file.write_text(json.dumps({"cameras": cameras, **more}))
         return file
 
@@ -86,11 +86,14 @@ class Flythrough(Cli):
             ((FRONT,), {"speed": 2}, "speed"),
             ((FRONT, {"eye": [1, 1, 0], "at": [1, 1, 6.6]}), {"frames": 3}, "looks nowhere"),
         ]
-        for cameras, more, *texts in wrong:
+        paths = [self.path(*cameras, name=f"{i}.json", **more) for i, (cameras, more, *_) in enumerate(wrong)]
+        results = together([lambda path=path: self.fly(path, *out) for path in paths])
+        for (cameras, more, *texts), path, result in zip(wrong, paths, results):
             with self.subTest(cameras=cameras, more=more):
-                self.assert_ends(self.fly(self.path(*cameras, **more), *out), BAD_FILE, "path.json", *texts)
+                self.assert_ends(result, BAD_FILE, path.name, *texts)
+            path.unlink()
         self.assert_ends(self.fly(self.folder / "none.json", *out), BAD_FILE, "none.json")
-        self.assertEqual(self.files(), ["path.json"])
+        self.assertEqual(self.files(), [])
 
     def test_wrong_command_lines_are_named(self):
         path, out = self.path(FRONT), ("-o", self.folder / "a.exr")
