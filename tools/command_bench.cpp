@@ -116,11 +116,12 @@ class BenchCommand {
     } catch (const Interrupted&) {
       bar_.wipe();
       write_tables();
-      fmt::print(stderr, "lumicut: interrupted; {} rows stand in {}; go on with --resume\n", results_["rows"].size(),
-                 results_file());
+      fmt::print(stderr, "lumicut: interrupted; {} rows stand in {}; go on with --resume\n",
+                 results_["rows"].size() + old_rows_.size(), results_file());
       throw SilentExit(kInterrupted);
     }
     bar_.wipe();
+    old_rows_.clear();  // what no run of this plan took
     write_tables();
     if (!o_.quiet) fmt::print("{}", to_text(bench_tables(results_)));
     if (!o_.quiet) fmt::print("{}: {} rows; tables beside it\n", results_file(), results_["rows"].size());
@@ -217,7 +218,8 @@ class BenchCommand {
       say(fmt::format("{} is of another version or machine: all runs begin anew", results_file()));
       return;
     }
-    old_rows_ = old["rows"];
+    for (const auto& row : old["rows"])
+      if (row.is_object() && row.contains("job") && !row.contains("failed")) old_rows_.push_back(row);
     results_["yardsticks"] = old.value("yardsticks", ordered_json::array());
   }
 
@@ -290,10 +292,14 @@ class BenchCommand {
     save();
   }
 
-  // The row of an earlier run, or {}.
-  ordered_json old_row(const ordered_json& job) const {
-    for (const auto& row : old_rows_)
-      if (row.is_object() && row.contains("job") && row["job"] == job && !row.contains("failed")) return row;
+  // Takes the row of an earlier run out of those that wait, or gives {}.
+  ordered_json old_row(const ordered_json& job) {
+    for (auto row = old_rows_.begin(); row != old_rows_.end(); ++row)
+      if (row->is_object() && row->contains("job") && (*row)["job"] == job && !row->contains("failed")) {
+        ordered_json taken = std::move(*row);
+        old_rows_.erase(row);
+        return taken;
+      }
     return ordered_json::object();
   }
 
@@ -541,7 +547,12 @@ class BenchCommand {
 
   // ---- Files ----
 
-  void save() { io::write_whole_file(results_file(), results_.dump(1) + "\n"); }
+  // With the earlier rows that are not taken yet: another stop must not lose them.
+  void save() {
+    ordered_json all = results_;
+    for (const auto& row : old_rows_) all["rows"].push_back(row);
+    io::write_whole_file(results_file(), all.dump(1) + "\n");
+  }
 
   void write_tables() {
     save();

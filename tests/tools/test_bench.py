@@ -207,6 +207,19 @@ class Failures(Bench):
         self.bench(self.plan(scenes=scenes), "--overwrite", code=FAILED, texts=("8 x 8", "32 x 24"))
         self.assertEqual(["failed" in r for r in self.results()["rows"]], [True, False])
 
+    def stop_after(self, name, plan, *arguments):
+        """Interrupts when the run of this name has ended."""
+        process = subprocess.Popen([COMMAND, "bench", plan, "-o", self.folder / "out", *arguments], stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.PIPE, text=True)
+        line = process.stderr.readline()
+        self.assertIn(name, line)
+        time.sleep(1)
+        self.assertIsNone(process.poll(), "long enough to be interrupted")
+        process.send_signal(signal.SIGINT)
+        text = process.communicate(timeout=60)[1]
+        self.assertEqual(process.returncode, INTERRUPTED, text)
+        self.assertIn("--resume", text)
+
     def test_an_interrupt_keeps_what_is_finished(self):
         size = [640, 640]
         reference = self.folder / "r.exr"
@@ -216,20 +229,18 @@ class Failures(Bench):
         runs = [{"name": "quick", "integrator": "lightcuts", "parameters": {"error": 1, "max_cut": 2}},
                 {"name": "slow", "integrator": "lightcuts", "parameters": {"error": 1e-7}}]
         plan = self.plan(scenes=[{"file": str(SCENE), "reference": "r.exr", "size": size, "vpls": 20000}], runs=runs)
-        process = subprocess.Popen([COMMAND, "bench", plan, "-o", self.folder / "out"], stdout=subprocess.DEVNULL,
-                                   stderr=subprocess.PIPE, text=True)
-        line = process.stderr.readline()
-        self.assertIn("quick", line)
-        time.sleep(1)
-        self.assertIsNone(process.poll(), "long enough to be interrupted")
-        process.send_signal(signal.SIGINT)
-        text = process.communicate(timeout=60)[1]
-        self.assertEqual(process.returncode, INTERRUPTED, text)
-        self.assertIn("--resume", text)
+        self.stop_after("quick", plan)
         self.assertEqual([r["run"] for r in self.results()["rows"]], ["quick"])
         self.assertIn("quick", (self.folder / "out/tables.txt").read_text())
         left = sorted(p.name for p in (self.folder / "out").rglob("*") if p.is_file())
         self.assertEqual(left, ["cornell_box.20000vpls.seed1.quick.exr", "results.json", "tables.md", "tables.txt"])
+        # A second stop, before the old row's turn, does not lose it.
+        kept = self.results()["rows"][0]["seconds_each"]
+        first = {"name": "first", "integrator": "lightcuts", "parameters": {"error": 1, "max_cut": 3}}
+        plan = self.plan(scenes=[{"file": str(SCENE), "reference": "r.exr", "size": size, "vpls": 20000}], runs=[first, runs[1], runs[0]])
+        self.stop_after("first", plan, "--resume")
+        self.assertEqual([r["run"] for r in self.results()["rows"]], ["first", "quick"])
+        self.assertEqual(self.results()["rows"][1]["seconds_each"], kept)
 
 
 class Plans(Bench):
