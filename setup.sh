@@ -10,6 +10,7 @@ packages=(
   libcgal-dev libgmp-dev libmpfr-dev                                    # geometry/ (a target of its own)
   libgtest-dev libgmock-dev libbenchmark-dev python3 python3-numpy      # tests and benchmarks
   binutils                                                              # a test reads the library's symbols
+  chromium                                                              # a test opens the report's page
 )
 
 missing=()

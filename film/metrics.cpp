@@ -196,6 +196,23 @@ std::vector<uint8_t> to_srgb8(const RgbImage& image, float exposure) {
   return result;
 }
 
+std::vector<float> relative_error_image(const RgbImage& image, const RgbImage& reference) {
+  check_shapes(image, reference);
+  const size_t n = size_t{image.width} * image.height;
+  const auto counts = [&](size_t p) { return is_finite(at(image, p)) && is_finite(at(reference, p)); };
+  double sum = 0, pixels = 0;
+  for (size_t p = 0; p < n; ++p)
+    if (counts(p)) sum += luminance64(at(reference, p)), ++pixels;
+  const double floor = sum > 0 ? 1e-3 * sum / pixels : 1;
+  std::vector<float> result(n, std::numeric_limits<float>::quiet_NaN());
+  for (size_t p = 0; p < n; ++p) {
+    if (!counts(p)) continue;
+    const double r = luminance64(at(reference, p));
+    result[p] = static_cast<float>((luminance64(at(image, p)) - r) / std::max(r, floor));
+  }
+  return result;
+}
+
 std::vector<float> error_image(const RgbImage& image, const RgbImage& reference, float exposure, float scale) {
   check_shapes(image, reference);
   const size_t n = size_t{image.width} * image.height;

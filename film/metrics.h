@@ -68,6 +68,10 @@ std::vector<uint8_t> to_srgb8(const RgbImage& image, float exposure);
 // One value a pixel; 1 where either image is not finite.
 std::vector<float> error_image(const RgbImage& image, const RgbImage& reference, float exposure, float scale);
 
+// (F - R) / max(R, floor) of luminance, signed: > 0 is too bright; the floor as above, over all finite pixels. One
+// value a pixel; NaN where either image is not finite. Its magnitude is what mean_relative_error averages.
+std::vector<float> relative_error_image(const RgbImage& image, const RgbImage& reference);
+
 // LDR-FLIP of two images of linear RGB, cut to [0,1] here; one value in [0,1] a pixel. [Andersson et al. 2020]
 // HDR images are exposed first: this is LDR-FLIP at one exposure, not HDR-FLIP's maximum over many.
 std::vector<float> flip_image(const RgbImage& image, const RgbImage& reference, float pixels_per_degree);

@@ -6,6 +6,7 @@
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfStringAttribute.h>
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 #include <half.h>
@@ -181,19 +182,26 @@ Image read_exr(const std::string& path) {
   }
 }
 
-void write_png(const std::string& path, const std::vector<uint8_t>& pixels, int width, int height, int components) {
+std::string encode_png(const std::string& name, const std::vector<uint8_t>& pixels, int width, int height,
+                       int components) {
   if (pixels.size() != static_cast<size_t>(width) * static_cast<size_t>(height) * static_cast<size_t>(components) ||
       pixels.empty())
-    throw FileError(path,
+    throw FileError(name,
                     fmt::format("{} values are no image of {} x {} x {}", pixels.size(), width, height, components));
-  AtomicFile file(path);
   const auto out = OIIO::ImageOutput::create("png");
-  if (!out) throw FileError(path, "OpenImageIO cannot write PNG here");
+  if (!out) throw FileError(name, "OpenImageIO cannot write PNG here");
+  std::vector<unsigned char> bytes;
+  OIIO::Filesystem::IOVecOutput memory(bytes);
   OIIO::ImageSpec spec(width, height, components, OIIO::TypeDesc::UINT8);
   spec.attribute("oiio:ColorSpace", "sRGB");
-  if (!out->open(file.temporary(), spec) || !out->write_image(OIIO::TypeDesc::UINT8, pixels.data()) || !out->close())
-    throw FileError(path, fmt::format("cannot be written: {}", out->geterror()));
-  file.commit();
+  out->set_ioproxy(&memory);
+  if (!out->open("memory.png", spec) || !out->write_image(OIIO::TypeDesc::UINT8, pixels.data()) || !out->close())
+    throw FileError(name, fmt::format("cannot be written: {}", out->geterror()));
+  return {bytes.begin(), bytes.end()};
+}
+
+void write_png(const std::string& path, const std::vector<uint8_t>& pixels, int width, int height, int components) {
+  write_whole_file(path, encode_png(path, pixels, width, height, components));
 }
 
 }  // namespace lumicut::io

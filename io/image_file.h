@@ -33,7 +33,12 @@ void write_exr(const std::string& path, const Image& image, bool half);
 // components. Throws FileError.
 Image read_exr(const std::string& path);
 
-// 8 bits a channel, rows from the top; components 1 or 3. Throws FileError.
+// The bytes of a PNG: 8 bits a channel, sRGB, rows from the top; components 1 or 3. `name` is what errors call it.
+// Throws FileError.
+std::string encode_png(const std::string& name, const std::vector<uint8_t>& pixels, int width, int height,
+                       int components);
+
+// The same into a file. Throws FileError.
 void write_png(const std::string& path, const std::vector<uint8_t>& pixels, int width, int height, int components);
 
 }  // namespace lumicut::io

@@ -5,18 +5,20 @@
 #include <nlohmann/json.hpp>
 
 #include "film/metrics.h"
+#include "io/atomic_file.h"
 #include "io/file_error.h"
 #include "io/image_file.h"
 #include "tools/commands.h"
+#include "tools/heat_map.h"
 
 namespace lumicut::tools {
 
 namespace {
 
 struct Options {
-  std::string image, reference, error_image, flip_image, layer = "radiance";
+  std::string image, reference, error_image, flip_image, error_map, signed_error_map, layer = "radiance";
   bool json = false, no_flip = false;
-  float scale = 32, ignore_above = std::numeric_limits<float>::infinity(), exposure = 0;
+  float scale = 32, ignore_above = std::numeric_limits<float>::infinity(), exposure = 0, error_map_top = 0;
 };
 
 // The layer as RGB; one component is repeated.
@@ -40,7 +42,28 @@ void write_grey(const std::string& path, const std::vector<float>& values, const
   io::write_png(path, bytes, image.width, image.height, 1);
 }
 
+bool is_exr(const std::string& path) { return path.size() > 4 && path.substr(path.size() - 4) == ".exr"; }
+
+// The relative error of every pixel: false colour in a PNG, or the numbers in an EXR.
+void write_error_map(const std::string& path, std::vector<float> errors, const io::Image& frame, bool with_sign,
+                     double top) {
+  if (!with_sign)
+    for (float& e : errors) e = std::abs(e);
+  if (is_exr(path)) {
+    io::Image out;
+    out.width = frame.width, out.height = frame.height, out.x0 = frame.x0, out.y0 = frame.y0;
+    out.frame_width = frame.frame_width, out.frame_height = frame.frame_height;
+    out.layers.push_back({with_sign ? "signed_relative_error" : "relative_error", 1, std::move(errors)});
+    io::write_exr(path, out, false);
+    return;
+  }
+  const ColorImage picture = error_color_map(errors, frame.width, frame.height, with_sign, top);
+  io::write_png(path, picture.pixels, picture.width, picture.height, 3);
+}
+
 void compare(const Options& options) {
+  for (const auto& path : {options.error_image, options.flip_image, options.error_map, options.signed_error_map})
+    if (!path.empty()) io::AtomicFile file(path);
   io::Image a, b;
   const auto image_pixels = load(options.image, options.layer, a);
   const auto reference_pixels = load(options.reference, options.layer, b);
@@ -79,6 +102,12 @@ void compare(const Options& options) {
   const auto exposure = static_cast<float>(m.exposure);
   if (!options.error_image.empty())
     write_grey(options.error_image, error_image(image, reference, exposure, options.scale), a);
+  if (!options.error_map.empty() || !options.signed_error_map.empty()) {
+    const std::vector<float> errors = relative_error_image(image, reference);
+    const auto top = static_cast<double>(options.error_map_top);
+    if (!options.error_map.empty()) write_error_map(options.error_map, errors, a, false, top);
+    if (!options.signed_error_map.empty()) write_error_map(options.signed_error_map, errors, a, true, top);
+  }
   if (!options.flip_image.empty()) {
     std::vector<float> x(image_pixels), y(reference_pixels);
     for (float& v : x) v *= exposure;
@@ -117,6 +146,15 @@ void add_compare(CLI::App& app) {
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
   command->add_option("--flip-image", o->flip_image, "Write a grey PNG of FLIP");
+  command->add_option(
+      "--error-map", o->error_map,
+      "Write each pixel's relative error: false colour with a log colour bar (PNG), or the numbers (EXR)");
+  command->add_option("--signed-error-map", o->signed_error_map,
+                      "The same with its sign: red is too bright, blue too dark");
+  command
+      ->add_option("--error-map-top", o->error_map_top,
+                   "Relative error at the colour bar's top (default: 1; of signed maps the 99th percentile, rounded)")
+      ->check(CLI::Range(1e-4, 1e4));
   command->add_option("--ignore-above", o->ignore_above,
                       "Leave out pixels whose reference luminance is at least this (visible lamps)");
   command

@@ -199,9 +199,10 @@ class FlythroughCommand {
       fmt::print("{}: {:.2f} s\n", o_.load_state.empty() ? "prepared" : "loaded " + o_.load_state, prepare_seconds_);
     if (o_.save_state.empty()) return;
     uint64_t size = 0;
-    io::check(api(), state_->save(integrator_.get(), nullptr, &size), "--save-state");
+    io::check(api(), state_->save(integrator_.get(), nullptr, &size), fmt::format("--save-state of {}", o_.integrator));
     std::string bytes(size, '\0');
-    io::check(api(), state_->save(integrator_.get(), bytes.data(), &size), "--save-state");
+    io::check(api(), state_->save(integrator_.get(), bytes.data(), &size),
+              fmt::format("--save-state of {}", o_.integrator));
     io::write_whole_file(o_.save_state, bytes);
   }
 

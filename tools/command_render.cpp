@@ -6,17 +6,21 @@
 #include <CLI/CLI.hpp>
 #include <atomic>
 #include <chrono>
+#include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "film/metrics.h"
 #include "io/atomic_file.h"
+#include "io/file_error.h"
 #include "io/image_file.h"
 #include "io/library.h"
 #include "io/scene_json.h"
 #include "io/scene_upload.h"
 #include "io/vpl_file.h"
 #include "tools/commands.h"
+#include "tools/heat_map.h"
 #include "tools/progress_bar.h"
 
 namespace lumicut::tools {
@@ -26,10 +30,10 @@ using nlohmann::ordered_json;
 namespace {
 
 struct Options {
-  std::string scene, integrator = "lightcuts", output, png, stats, vpl_in, vpl_out, size, crop, layers,
+  std::string scene, integrator = "lightcuts", output, png, stats, vpl_in, vpl_out, size, crop, layers, heat_maps,
                      accel = "embree";
   std::vector<std::string> parameters;
-  uint32_t samples = 0;
+  uint32_t samples = 0, squares = 0;
   int threads = 0, verbosity = 1;
   uint64_t seed = 0, vpls = 0;
   bool has_seed = false, has_vpls = false, quiet = false, half = false;
@@ -95,13 +99,35 @@ std::vector<Channel> choose_channels(const io::Api& api, const std::string& aske
   }
   if (asked == "all") return known;
   std::vector<Channel> chosen;
-  std::stringstream words(asked.empty() ? "radiance,depth,normal,albedo,cut_size" : asked);
+  std::stringstream words(asked.empty() ? "radiance,depth,normal,albedo,cut_size,rays,bounds" : asked);
   for (std::string word; std::getline(words, word, ',');) {
     const auto at = std::find_if(known.begin(), known.end(), [&](const Channel& c) { return c.name == word; });
     if (at == known.end()) throw UsageError(fmt::format("--layers: no layer \"{}\"; there are {}", word, names));
     chosen.push_back(*at);
   }
   return chosen;
+}
+
+// `count` squares of kSquare pixels (less at the edges), spread evenly over the frame whatever their number; all of it
+// when there are no more. [Roberts 2018, R2 sequence]
+std::vector<lumicut_tile> choose_squares(uint32_t width, uint32_t height, uint32_t count) {
+  constexpr uint32_t kSquare = 32;
+  const uint32_t across = (width + kSquare - 1) / kSquare, down = (height + kSquare - 1) / kSquare;
+  count = std::min(count, across * down);
+  std::vector<bool> taken(size_t{across} * down);
+  std::vector<lumicut_tile> squares;
+  for (uint64_t i = 0; squares.size() < count; ++i) {
+    const auto place = [&](double step, uint32_t cells) {
+      const double x = 0.5 + static_cast<double>(i) * step;
+      return std::min(static_cast<uint32_t>((x - std::floor(x)) * cells), cells - 1);
+    };
+    const uint32_t x = place(0.7548776662466927, across), y = place(0.5698402909980532, down);
+    if (taken[size_t{y} * across + x]) continue;
+    taken[size_t{y} * across + x] = true;
+    squares.push_back({sizeof(lumicut_tile), x * kSquare, y * kSquare, std::min(width, (x + 1) * kSquare),
+                       std::min(height, (y + 1) * kSquare)});
+  }
+  return squares;
 }
 
 void log_message(void* user, int32_t level, const char* text) {
@@ -162,6 +188,14 @@ class RenderCommand {
   void check_outputs() {
     for (const auto& path : {o_.output, o_.png, o_.stats, o_.vpl_out})
       if (!path.empty()) io::AtomicFile file(path);
+    if (!o_.heat_maps.empty()) {
+      const std::filesystem::path folder(o_.heat_maps);
+      std::error_code code;
+      std::filesystem::create_directory(folder, code);
+      if (!std::filesystem::is_directory(folder, code))
+        throw io::FileError(o_.heat_maps, "is no folder, and cannot be made one");
+      for (const CountLayer& layer : kCountLayers) io::AtomicFile file(heat_map_path(layer));
+    }
     if (!o_.size.empty()) size_ = numbers(o_.size, 'x', 2, "--size");
     if (!o_.crop.empty()) crop_ = numbers(o_.crop, ',', 4, "--crop");
   }
@@ -181,17 +215,21 @@ class RenderCommand {
     if (api().scene_create(device_.get(), &scene, scene_.out()) != LUMICUT_OK) throw UsageError(api().last_error());
   }
 
-  void create_integrator() {
-    if (api().integrator_create(device_.get(), o_.integrator.c_str(), integrator_.out()) != LUMICUT_OK)
+  void create_integrator(io::Handle<lumicut_integrator>& integrator) {
+    if (api().integrator_create(device_.get(), o_.integrator.c_str(), integrator.out()) != LUMICUT_OK)
       throw UsageError(api().last_error());
-    if (o_.has_vpls) set_parameter(api(), integrator_.get(), "vpls", std::to_string(o_.vpls));
-    if (o_.has_seed) set_parameter(api(), integrator_.get(), "seed", std::to_string(o_.seed));
+    if (o_.has_vpls) set_parameter(api(), integrator.get(), "vpls", std::to_string(o_.vpls));
+    if (o_.has_seed) set_parameter(api(), integrator.get(), "seed", std::to_string(o_.seed));
     for (const auto& parameter : o_.parameters) {
       const size_t equals = parameter.find('=');
       if (equals == std::string::npos || equals == 0)
         throw UsageError(fmt::format("-p {}: must be name=value", parameter));
-      set_parameter(api(), integrator_.get(), parameter.substr(0, equals), parameter.substr(equals + 1));
+      set_parameter(api(), integrator.get(), parameter.substr(0, equals), parameter.substr(equals + 1));
     }
+  }
+
+  void create_integrator() {
+    create_integrator(integrator_);
     if (o_.vpl_in.empty()) return;
     lights_ = io::read_vpls(o_.vpl_in);
     if (lights_.empty()) throw UsageError(fmt::format("--vpl-in {}: holds no light", o_.vpl_in));
@@ -235,21 +273,86 @@ class RenderCommand {
     commit_seconds_ = now() - start;
   }
 
+  // The whole, the crop, or the squares: each is a render of its own.
   void render() {
-    const lumicut_result started = api().render_start(integrator_.get(), scene_.get(), &desc_, render_.out());
-    io::check(api(), started, "render");
-    watcher_.watch(render_.get());
+    std::vector<lumicut_tile> parts;
+    if (o_.squares > 0) {
+      parts = choose_squares(desc_.width, desc_.height, o_.squares);
+    } else {
+      parts.push_back({sizeof(lumicut_tile), desc_.crop[0], desc_.crop[1], crop_.empty() ? desc_.width : desc_.crop[2],
+                       crop_.empty() ? desc_.height : desc_.crop[3]});
+    }
+    start_part(parts[0], integrator_);
+    wait_for(0, parts.size());
+    if (parts.size() > 1) render_squares(parts);
+    bar_.wipe();
+  }
+
+  // A square is less than the threads can share, and an integrator renders one at a time: so there are several of it,
+  // on the same lights.
+  void render_squares(const std::vector<lumicut_tile>& parts) {
+    const lumicut_vpl* lights = nullptr;
+    uint64_t light_count = 0;
+    io::check(api(), api().integrator_get_lights(integrator_.get(), &lights, &light_count), "virtual lights");
+    const size_t threads = o_.threads > 0 ? static_cast<size_t>(o_.threads) : std::thread::hardware_concurrency();
+    std::vector<io::Handle<lumicut_integrator>> others;
+    while (others.size() + 2 < std::min(parts.size(), threads + 2)) {
+      others.emplace_back(api());
+      create_integrator(others.back());
+      io::check(api(), api().integrator_set_lights(others.back().get(), lights, light_count), "virtual lights");
+      watcher_.watch(others.back().get());
+      const lumicut_result prepared = api().integrator_prepare(others.back().get(), scene_.get());
+      watcher_.watch(nullptr);
+      stop_if_interrupted();
+      io::check(api(), prepared, "preparation");
+    }
+    const double start = now();
+    while (parts_.size() < parts.size()) {
+      const size_t first = parts_.size(), last = std::min(parts.size(), first + others.size() + 1);
+      for (size_t i = first; i < last; ++i) start_part(parts[i], i == first ? integrator_ : others[i - first - 1]);
+      for (size_t i = first; i < last; ++i) wait_for(i, parts.size());
+    }
+    squares_seconds_ = now() - start;
+  }
+
+  void start_part(const lumicut_tile& rect, const io::Handle<lumicut_integrator>& integrator) {
+    lumicut_render_desc desc = desc_;
+    if (o_.squares > 0) desc.crop[0] = rect.x0, desc.crop[1] = rect.y0, desc.crop[2] = rect.x1, desc.crop[3] = rect.y1;
+    parts_.emplace_back(rect, io::Handle<lumicut_render>(api()));
+    io::check(api(), api().render_start(integrator.get(), scene_.get(), &desc, parts_.back().second.out()), "render");
+  }
+
+  void wait_for(size_t index, size_t count) {
+    const lumicut_render render = parts_[index].second.get();
+    watcher_.watch(render);
     lumicut_status status{};
     lumicut_result result;
     do {
       status.struct_size = sizeof(status);
-      result = api().render_wait(render_.get(), 100, &status);
-      if (result == LUMICUT_OK) bar_.show(status.phase ? status.phase : "", status.fraction, status.seconds);
+      result = api().render_wait(render, 100, &status);
+      if (result == LUMICUT_OK)
+        bar_.show(
+            status.phase ? status.phase : "",
+            count == 1 ? status.fraction : (static_cast<double>(index) + status.fraction) / static_cast<double>(count),
+            status.seconds);
     } while (result == LUMICUT_OK && (status.state == LUMICUT_RUNNING || status.state == LUMICUT_IDLE));
     watcher_.watch(nullptr);
-    bar_.wipe();
     stop_if_interrupted();
     io::check(api(), result, "render");
+  }
+
+  // The part's own statistics; of squares the sums, and seconds by the wall.
+  ordered_json own_statistics() const {
+    ordered_json all = ordered_json::parse(api().stats_json(parts_[0].second.get()));
+    if (parts_.size() == 1) return all;
+    for (size_t i = 1; i < parts_.size(); ++i) {
+      const auto part = ordered_json::parse(api().stats_json(parts_[i].second.get()));
+      for (const auto& [name, count] : part["counters"].items())
+        all["counters"][name] = all["counters"].value(name, uint64_t{0}) + count.get<uint64_t>();
+    }
+    all["seconds"] = all["seconds"].get<double>() + squares_seconds_;
+    all["phases"]["render"] = all["phases"].value("render", 0.0) + squares_seconds_;
+    return all;
   }
 
   void write(const std::vector<Channel>& channels) {
@@ -260,15 +363,28 @@ class RenderCommand {
     image.width = static_cast<int>(width), image.height = static_cast<int>(height);
     image.x0 = static_cast<int>(x0), image.y0 = static_cast<int>(y0);
     image.frame_width = static_cast<int>(desc_.width), image.frame_height = static_cast<int>(desc_.height);
+    // Where no part is, not a number: comparisons leave those pixels out.
     const auto read = [&](const Channel& channel) {
+      const auto components = static_cast<size_t>(channel.components);
       io::ImageLayer layer{channel.name, channel.components, {}};
-      layer.pixels.resize(size_t{width} * height * static_cast<size_t>(channel.components));
-      io::check(api(), api().render_read(render_.get(), channel.name.c_str(), nullptr, layer.pixels.data()),
-                channel.name);
+      layer.pixels.assign(size_t{width} * height * components, std::numeric_limits<float>::quiet_NaN());
+      std::vector<float> rows;
+      for (const auto& [rect, render] : parts_) {
+        const size_t row = (rect.x1 - rect.x0) * components;
+        rows.resize(row * (rect.y1 - rect.y0));
+        io::check(api(), api().render_read(render.get(), channel.name.c_str(), nullptr, rows.data()), channel.name);
+        for (size_t y = rect.y0; y < rect.y1; ++y)
+          std::copy_n(
+              rows.begin() + static_cast<std::ptrdiff_t>((y - rect.y0) * row), row,
+              layer.pixels.begin() + static_cast<std::ptrdiff_t>(((y - y0) * width + (rect.x0 - x0)) * components));
+      }
       return layer;
     };
-    const ordered_json own = ordered_json::parse(api().stats_json(render_.get()));
-    ordered_json stats = statistics(own, double{static_cast<double>(width)} * height, read_seconds_, commit_seconds_);
+    double pixels = 0;
+    for (const auto& [rect, render] : parts_)
+      pixels += static_cast<double>(rect.x1 - rect.x0) * static_cast<double>(rect.y1 - rect.y0);
+    ordered_json stats = statistics(own_statistics(), pixels, read_seconds_, commit_seconds_);
+    stats["rendered_pixels"] = pixels;
     const lumicut_vpl* lights = nullptr;
     uint64_t light_count = 0;
     io::check(api(), api().integrator_get_lights(integrator_.get(), &lights, &light_count), "virtual lights");
@@ -290,12 +406,21 @@ class RenderCommand {
       io::write_png(o_.png, to_srgb8(rgb, o_.exposure > 0 ? o_.exposure : auto_exposure(rgb)), image.width,
                     image.height, 3);
     }
+    if (!o_.heat_maps.empty())
+      for (const CountLayer& counts : kCountLayers) {
+        const ColorImage map = heat_map(read({counts.name, 1}).pixels, image.width, image.height, counts.title);
+        io::write_png(heat_map_path(counts), map.pixels, map.width, map.height, 3);
+      }
     if (!o_.vpl_out.empty()) io::write_vpls(o_.vpl_out, lights, light_count);
     if (!o_.stats.empty()) io::write_whole_file(o_.stats, stats.dump(2) + "\n");
     if (!o_.quiet)
       fmt::print("{}: {} lights, {}x{}, {:.2f} s, {:.0f} rays, {:.0f} bounds, {:.0f} clusters a pixel\n", o_.integrator,
                  light_count, width, height, stats["seconds"].get<double>(), stats["rays_per_pixel"].get<double>(),
                  stats["bounds_per_pixel"].get<double>(), stats["clusters_per_pixel"].get<double>());
+  }
+
+  std::string heat_map_path(const CountLayer& layer) const {
+    return (std::filesystem::path(o_.heat_maps) / (std::string(layer.name) + ".png")).string();
   }
 
   // What was rendered and how, so that it can be rendered again.
@@ -326,13 +451,13 @@ class RenderCommand {
   io::Handle<lumicut_device> device_{library_.api()};
   io::Handle<lumicut_scene> scene_{library_.api()};
   io::Handle<lumicut_integrator> integrator_{library_.api()};
-  io::Handle<lumicut_render> render_{library_.api()};
+  std::vector<std::pair<lumicut_tile, io::Handle<lumicut_render>>> parts_;
   InterruptWatcher watcher_;         // ends before the handles that it may cancel
   std::vector<lumicut_vpl> lights_;  // of --vpl-in
   std::vector<uint32_t> size_, crop_;
   lumicut_render_desc desc_{};
   uint64_t triangles_ = 0;
-  double read_seconds_ = 0, commit_seconds_ = 0;
+  double read_seconds_ = 0, commit_seconds_ = 0, squares_seconds_ = 0;
 };
 
 }  // namespace
@@ -351,14 +476,23 @@ void add_render(CLI::App& app) {
       ->add_option("--exposure", o->exposure,
                    "Factor from radiance to [0,1] for the PNG (default: 0.18 / geometric mean)")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--layers", o->layers,
-                      "Layers of the EXR, with commas, or `all` (default: radiance,depth,normal,albedo,cut_size)");
+  command->add_option(
+      "--layers", o->layers,
+      "Layers of the EXR, with commas, or `all` (default: radiance,depth,normal,albedo,cut_size,rays,bounds)");
   command->add_flag("--half", o->half, "16 bits a number in the EXR instead of 32");
   command->add_option("--vpls", o->vpls, "Number of virtual lights; as -p vpls=N");
   command->add_option("--seed", o->seed, "Seed of all randomness; as -p seed=N");
   command->add_option("--size", o->size, "WIDTHxHEIGHT in pixels (default: the scene's)");
   command->add_option("--spp", o->samples, "Samples a pixel (default: the scene's)")->check(CLI::Range(1, 65536));
   command->add_option("--crop", o->crop, "x0,y0,x1,y1: the part of the image to render, row 0 on top");
+  command
+      ->add_option(
+          "--squares", o->squares,
+          "Render only so many squares of 32 pixels, spread over the image; others are not numbers (EXR alone)")
+      ->check(CLI::Range(1, 1 << 24))
+      ->excludes("--crop");
+  command->add_option("--heat-map", o->heat_maps,
+                      "Folder for false-colour PNGs of what a point cost: bounds, cut_size, rays");
   command->add_option("--threads", o->threads, "Threads; 0: all")->capture_default_str()->check(CLI::Range(0, 4096));
   command->add_option("--accel", o->accel, "How rays are traced: embree or agglomerative")->capture_default_str();
   command->add_option("--vpl-in", o->vpl_in, "Take the virtual lights from this file");
@@ -374,8 +508,8 @@ void add_render(CLI::App& app) {
   command->callback([o, command] {
     o->has_seed = command->count("--seed") > 0;
     o->has_vpls = command->count("--vpls") > 0;
-    if (o->output.empty() && o->png.empty() && o->stats.empty() && o->vpl_out.empty())
-      throw UsageError("render: nothing to write; give -o out.exr, --png, --stats or --vpl-out");
+    if (o->output.empty() && o->png.empty() && o->stats.empty() && o->vpl_out.empty() && o->heat_maps.empty())
+      throw UsageError("render: nothing to write; give -o out.exr, --png, --stats, --heat-map or --vpl-out");
     catch_interrupts();
     RenderCommand(*o).run();
   });

@@ -26,6 +26,16 @@ class Interrupted : public std::runtime_error {
   Interrupted() : std::runtime_error("interrupted; nothing was written") {}
 };
 
+// Ends the command with this code; what there is to say has been said.
+class SilentExit : public std::runtime_error {
+ public:
+  explicit SilentExit(int code) : std::runtime_error(""), code_(code) {}
+  int code() const { return code_; }
+
+ private:
+  int code_;
+};
+
 // Set by the first Ctrl-C (or SIGTERM); the second ends the program at once.
 extern volatile std::sig_atomic_t interrupted;
 void catch_interrupts();
@@ -37,6 +47,8 @@ inline void stop_if_interrupted() {
 void add_render(CLI::App& app);
 void add_flythrough(CLI::App& app);
 void add_compare(CLI::App& app);
+void add_bench(CLI::App& app);
+void add_report(CLI::App& app);
 void add_info(CLI::App& app);
 
 }  // namespace lumicut::tools

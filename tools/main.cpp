@@ -28,7 +28,9 @@ int run(int argc, char** argv) {
       "  lumicut info                                         what the library offers\n"
       "  lumicut render scene.json -i lightcuts -o out.exr    an image\n"
       "  lumicut render scene.json -i exhaustive -o ref.exr   the same from all lights: the reference\n"
-      "  lumicut compare out.exr ref.exr                      how far the one is from the other\n");
+      "  lumicut compare out.exr ref.exr                      how far the one is from the other\n"
+      "  lumicut bench plan.json -o out/bench                 scenes and methods: times, counts, errors\n"
+      "  lumicut report out/bench/results.json -o page.html   the same as a page\n");
   app.name("lumicut");
   app.require_subcommand(1);
   app.footer(
@@ -37,6 +39,8 @@ int run(int argc, char** argv) {
   add_render(app);
   add_flythrough(app);
   add_compare(app);
+  add_bench(app);
+  add_report(app);
   add_info(app);
   const auto complain = [](const char* text, int code) {
     fmt::print(stderr, "lumicut: {}\n", text);
@@ -47,6 +51,8 @@ int run(int argc, char** argv) {
     return kOk;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kOk : kUsage;  // --help is an error of code 0
+  } catch (const SilentExit& error) {
+    return error.code();
   } catch (const Interrupted& error) {
     return complain(error.what(), kInterrupted);
   } catch (const UsageError& error) {

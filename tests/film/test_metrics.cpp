@@ -271,5 +271,30 @@ TEST(Flip, RefusesImpossibleViewingConditions) {
   for (const float ppd : {0.0f, -1.0f, NAN, INFINITY}) EXPECT_THROW(flip_image(a.view(), a.view(), ppd), Error);
 }
 
+TEST(RelativeErrorImage, AveragesToTheMeasureAndHasItsSign) {
+  Picture a = noise(24, 16, 1);
+  const Picture b = noise(24, 16, 2);
+  a.set(3, 2, 0, 0, 0);
+  const auto errors = relative_error_image(a.view(), b.view());
+  double sum = 0, largest = 0;
+  for (const float e : errors) sum += std::abs(e), largest = std::max(largest, std::abs(double{e}));
+  const Metrics m = compare_images(a.view(), b.view());
+  // Single precision of each pixel's value.
+  EXPECT_NEAR(sum / (24 * 16), m.mean_relative_error, 1e-6 * m.mean_relative_error);
+  EXPECT_NEAR(largest, m.max_relative_error, 1e-6 * largest);
+  EXPECT_FLOAT_EQ(errors[2 * 24 + 3], -1);
+  for (const float e : relative_error_image(scaled(b, 1.25f).view(), b.view())) EXPECT_NEAR(e, 0.25, 1e-6);
+}
+
+TEST(RelativeErrorImage, IsNotANumberWhereAnImageIsNone) {
+  Picture a(4, 4, 1);
+  a.set(1, 0, NAN, 1, 1);
+  const Picture black(4, 4);
+  const auto errors = relative_error_image(a.view(), Picture(4, 4, 1).view());
+  EXPECT_TRUE(std::isnan(errors[1]));
+  EXPECT_EQ(errors[0], 0);
+  EXPECT_EQ(relative_error_image(black.view(), black.view())[5], 0);
+}
+
 }  // namespace
 }  // namespace lumicut

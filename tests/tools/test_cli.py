@@ -6,42 +6,15 @@ import pty
 import select
 import signal
 import subprocess
-import sys
-import tempfile
 import time
 import unittest
 
-ROOT = pathlib.Path(os.environ.get("LUMICUT_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
-BUILD = pathlib.Path(os.environ.get("LUMICUT_BINARY_DIR", ROOT / "build/release"))
-COMMAND = BUILD / "bin/lumicut"
-SCENE = ROOT / "reference_images/cornell_box/cornell_box.json"
-sys.path.insert(0, str(ROOT / "export_scripts/scenes"))
-from scene_writer import write_exr  # noqa: E402
-
-OK, FAILED, USAGE, BAD_FILE, INTERRUPTED = 0, 1, 2, 3, 130
+from cli import BAD_FILE, COMMAND, FAILED, INTERRUPTED, OK, SCENE, USAGE, Cli as Base, lumicut, wait_until_busy, write_exr
 
 
-def lumicut(*arguments, env=None):
-    return subprocess.run([COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=300,
-                          env={**os.environ, **(env or {})})
-
-
-class Cli(unittest.TestCase):
-    def setUp(self):
-        temporary = tempfile.TemporaryDirectory()
-        self.addCleanup(temporary.cleanup)
-        self.folder = pathlib.Path(temporary.name)
-
-    def files(self):
-        return sorted(path.name for path in self.folder.iterdir())
-
+class Cli(Base):
     def render(self, *arguments, scene=SCENE):
         return lumicut("render", scene, "--size", "24x24", "--vpls", "200", *arguments)
-
-    def assert_ends(self, result, code, *texts):
-        self.assertEqual(result.returncode, code, result.stderr)
-        for text in texts:
-            self.assertIn(text, result.stderr)
 
 
 class Info(Cli):
@@ -145,21 +118,12 @@ class Render(Cli):
         self.assert_ends(lumicut("compare", image, image, "--layer", "depth"), OK)
         self.assert_ends(lumicut("compare", image, image, "--layer", "normal"), BAD_FILE, "normal", "depth")
 
-    def wait_until_busy(self, process, seconds):
-        """Until the process has used so much processor time: loading libraries alone takes less."""
-        tick, limit = os.sysconf("SC_CLK_TCK"), time.monotonic() + 60
-        while process.poll() is None and time.monotonic() < limit:
-            fields = pathlib.Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
-            if (int(fields[11]) + int(fields[12])) / tick > seconds:
-                return
-            time.sleep(0.02)
-
     def test_an_interrupt_leaves_no_file(self):
         for code, wait in ((signal.SIGINT, 1.0), (signal.SIGTERM, 2.5)):
             names = [x for option, name in (("-o", "a.exr"), ("--png", "a.png"), ("--stats", "a.json")) for x in (option, self.folder / name)]
             process = subprocess.Popen([COMMAND, "render", SCENE, "-i", "exhaustive", "--vpls", "500000", "--size", "2000x2000", *names],
                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-            self.wait_until_busy(process, wait)
+            wait_until_busy(process, wait)
             self.assertIsNone(process.poll(), "long enough to be interrupted")
             process.send_signal(code)
             started = time.monotonic()
