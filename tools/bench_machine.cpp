@@ -89,7 +89,7 @@ Triangles flatten(const io::SceneData& scene) {
 
 }  // namespace
 
-ordered_json measure_yardstick(const io::Api& api, const std::string& scene, const std::string& accel, int threads) {
+ordered_json measure_yardstick(const io::Api& api, const std::string& scene, int threads) {
   constexpr size_t kRays = 1000000;
   const Triangles triangles = flatten(io::read_scene(scene));
   std::vector<double> area_below;
@@ -125,7 +125,7 @@ ordered_json measure_yardstick(const io::Api& api, const std::string& scene, con
   io::check(api, api.device_create(&device_desc, device.out()), "device");
   lumicut_accel_desc desc{};
   desc.struct_size = sizeof(desc);
-  desc.kind = accel.c_str();
+  desc.kind = "embree";
   desc.positions = triangles.positions.data(), desc.position_count = triangles.positions.size() / 3;
   desc.indices = triangles.indices.data(), desc.triangle_count = triangles.indices.size() / 3;
   io::Handle<lumicut_accel> built(api);
@@ -141,7 +141,7 @@ ordered_json measure_yardstick(const io::Api& api, const std::string& scene, con
     blocked = static_cast<size_t>(std::count_if(work.begin(), work.end(), [](const auto& r) { return r.tfar < 0; }));
   }
   return {{"call", "lumicut_accel_occluded"},
-          {"accel", accel},
+          {"accel", "embree"},
           {"rays", kRays},
           {"mray_per_second", static_cast<double>(kRays) / best / 1e6},
           {"occluded", static_cast<double>(blocked) / kRays}};

@@ -17,7 +17,6 @@ std::string git_description();
 // The yardstick: shadow rays between a million random pairs of area-uniform surface points of a scene, through
 // lumicut_accel_occluded, so that seconds of one machine can be told in those of another.
 // {"call", "accel", "rays", "mray_per_second": best of five, "occluded": share}
-nlohmann::ordered_json measure_yardstick(const io::Api& api, const std::string& scene, const std::string& accel,
-                                         int threads);
+nlohmann::ordered_json measure_yardstick(const io::Api& api, const std::string& scene, int threads);
 
 }  // namespace lumicut::tools

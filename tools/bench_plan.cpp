@@ -53,6 +53,10 @@ class PlanReader {
       static const std::vector<std::string> kKinds = {"embree", "agglomerative"};
       plan_.accel = kKinds[accel->choice(kKinds)];
     }
+    if (const auto rays = top.find("rays")) {
+      static const std::vector<std::string> kKinds = {"robust", "fast"};
+      plan_.rays = kKinds[rays->choice(kKinds)];
+    }
     usual_.samples = {}, usual_.vpls = {60000}, usual_.seeds = {1};
     shared(top, usual_);
     const JsonValue scenes = top.need("scenes"), runs = top.need("runs");

@@ -45,7 +45,7 @@ struct BenchScene {
 };
 
 struct BenchPlan {
-  std::string file, name, description, accel = "embree", baseline;
+  std::string file, name, description, accel = "embree", rays = "robust", baseline;
   int threads = 0, repeat = 1, amortise_views = 10;
   bool keep_images = true, yardstick = false;
   std::vector<BenchScene> scenes;

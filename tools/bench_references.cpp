@@ -33,9 +33,17 @@ std::string BenchGroup::name() const {
 }
 
 std::vector<std::string> BenchGroup::arguments() const {
-  std::vector<std::string> all = {"render",      scene->file, "-q",
-                                  "--verbosity", "0",         "--accel",
-                                  plan->accel,   "--threads", std::to_string(plan->threads)};
+  std::vector<std::string> all = {"render",
+                                  scene->file,
+                                  "-q",
+                                  "--verbosity",
+                                  "0",
+                                  "--accel",
+                                  plan->accel,
+                                  "--rays",
+                                  plan->rays,
+                                  "--threads",
+                                  std::to_string(plan->threads)};
   const auto add = [&](const std::string& option, const std::string& value) {
     all.push_back(option);
     all.push_back(value);

@@ -202,6 +202,7 @@ class BenchCommand {
                 {"machine", describe_machine()},
                 {"threads", plan_.threads},
                 {"accel", plan_.accel},
+                {"rays", plan_.rays},
                 {"repeat", plan_.repeat},
                 {"baseline", plan_.baseline},
                 {"amortise_views", plan_.amortise_views},
@@ -328,7 +329,7 @@ class BenchCommand {
     for (const auto& known : results_["yardsticks"])
       if (known["scene"] == group.scene->name) return;
     ordered_json entry = {{"scene", group.scene->name}};
-    entry.update(measure_yardstick(api(), group.scene->file, plan_.accel, plan_.threads));
+    entry.update(measure_yardstick(api(), group.scene->file, plan_.threads));
     say(fmt::format("{}: yardstick: {:.2f} Mray/s, {:.0f} % occluded", group.scene->name,
                     entry["mray_per_second"].get<double>(), 100 * entry["occluded"].get<double>()));
     results_["yardsticks"].push_back(entry);
@@ -418,8 +419,8 @@ class BenchCommand {
     for (const auto& [name, value] : parameters) arguments.insert(arguments.end(), {"-p", name + "=" + value});
     row["command"] = fmt::format("lumicut {}", fmt::join(arguments, " "));
     for (const char* key :
-         {"parameters", "vpls", "width", "height", "samples", "accel", "threads", "triangles", "rays_per_pixel",
-          "bounds_per_pixel", "clusters_per_pixel", "phases", "counters", "version"})
+         {"parameters", "vpls", "width", "height", "samples", "accel", "robust", "threads", "triangles",
+          "rays_per_pixel", "bounds_per_pixel", "clusters_per_pixel", "phases", "counters", "version"})
       row[key] = trial.stats[key];
     row["git"] = results_["git"];
     set_errors(row, trial.metrics);

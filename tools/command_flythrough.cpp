@@ -26,7 +26,7 @@ namespace {
 
 struct Options {
   std::string scene, cameras, integrator = "wspd", output, png, stats, vpl_in, size, save_state, load_state,
-                              accel = "embree";
+                              accel = "embree", rays = "robust";
   std::vector<std::string> parameters;
   uint32_t samples = 0;
   int threads = 0;
@@ -161,6 +161,7 @@ class FlythroughCommand {
     lumicut_scene_desc scene{};
     scene.struct_size = sizeof(scene);
     scene.accel = o_.accel.c_str();
+    scene.robust = o_.rays == "robust" ? 1 : 0;
     if (api().scene_create(device_.get(), &scene, scene_.out()) != LUMICUT_OK ||
         api().integrator_create(device_.get(), o_.integrator.c_str(), integrator_.out()) != LUMICUT_OK)
       throw UsageError(api().last_error());
@@ -308,6 +309,9 @@ void add_flythrough(CLI::App& app) {
   command->add_option("--spp", o->samples, "Samples a pixel (default: the scene's)")->check(CLI::Range(1, 65536));
   command->add_option("--threads", o->threads, "Threads; 0: all")->capture_default_str()->check(CLI::Range(0, 4096));
   command->add_option("--accel", o->accel, "How rays are traced: embree or agglomerative")->capture_default_str();
+  command->add_option("--rays", o->rays, "robust: none slips between two triangles; fast: some may, in less time")
+      ->check(CLI::IsMember({"robust", "fast"}))
+      ->capture_default_str();
   command->add_option("--vpl-in", o->vpl_in, "Take the virtual lights from this file");
   command->add_option("--stats", o->stats, "JSON file of seconds and counts to write");
   command->add_flag("-q,--quiet", o->quiet, "Nothing on the terminal");

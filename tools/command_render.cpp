@@ -31,7 +31,7 @@ namespace {
 
 struct Options {
   std::string scene, integrator = "lightcuts", output, png, stats, vpl_in, vpl_out, size, crop, layers, heat_maps,
-                     accel = "embree";
+                     accel = "embree", rays = "robust";
   std::vector<std::string> parameters;
   uint32_t samples = 0, squares = 0;
   int threads = 0, verbosity = 1;
@@ -212,6 +212,7 @@ class RenderCommand {
     lumicut_scene_desc scene{};
     scene.struct_size = sizeof(scene);
     scene.accel = o_.accel.c_str();
+    scene.robust = o_.rays == "robust" ? 1 : 0;
     if (api().scene_create(device_.get(), &scene, scene_.out()) != LUMICUT_OK) throw UsageError(api().last_error());
   }
 
@@ -432,6 +433,7 @@ class RenderCommand {
     stats["triangles"] = triangles_;
     stats["width"] = desc_.width, stats["height"] = desc_.height, stats["samples"] = desc_.samples;
     stats["accel"] = o_.accel;
+    stats["robust"] = o_.rays == "robust";
     stats["threads"] = o_.threads;
     ordered_json parameters = ordered_json::object();
     for (uint32_t i = 0;; ++i) {
@@ -495,6 +497,9 @@ void add_render(CLI::App& app) {
                       "Folder for false-colour PNGs of what a point cost: bounds, cut_size, rays");
   command->add_option("--threads", o->threads, "Threads; 0: all")->capture_default_str()->check(CLI::Range(0, 4096));
   command->add_option("--accel", o->accel, "How rays are traced: embree or agglomerative")->capture_default_str();
+  command->add_option("--rays", o->rays, "robust: none slips between two triangles; fast: some may, in less time")
+      ->check(CLI::IsMember({"robust", "fast"}))
+      ->capture_default_str();
   command->add_option("--vpl-in", o->vpl_in, "Take the virtual lights from this file");
   command->add_option("--vpl-out", o->vpl_out, "Write the virtual lights to this file");
   command->add_option("--stats", o->stats, "JSON file of seconds, counts and memory to write");

@@ -228,8 +228,8 @@ std::string facts(const ordered_json& results) {
                              machine.value("load", 0.0)));
   const int threads = results.at("threads").get<int>();
   add("Runs",
-      fmt::format("{} threads, rays by {}, repeated {}x, medians", threads == 0 ? "all" : std::to_string(threads),
-                  text_of(results.at("accel")), results.at("repeat").get<int>()));
+      fmt::format("{} threads, {} rays by {}, repeated {}x, medians", threads == 0 ? "all" : std::to_string(threads),
+                  results.value("rays", "robust"), text_of(results.at("accel")), results.at("repeat").get<int>()));
   for (const auto& y : results.at("yardsticks"))
     add("Yardstick", fmt::format("{}: {:.2f} Mray/s between random surface points ({}, {})", text_of(y.at("scene")),
                                  y.at("mray_per_second").get<double>(), text_of(y.at("call")), text_of(y.at("accel"))));
