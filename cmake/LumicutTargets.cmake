@@ -63,3 +63,15 @@ function(lumicut_test name)
   set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT}
     ENVIRONMENT "LUMICUT_SOURCE_DIR=${PROJECT_SOURCE_DIR};LUMICUT_BINARY_DIR=${PROJECT_BINARY_DIR};${ARG_ENVIRONMENT}")
 endfunction()
+
+# The tests of `name` that match `filter` once more on each lesser instruction set. For tests with SIMD code in them.
+function(lumicut_test_instruction_sets name filter)
+  target_sources(${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests/instruction_set.cpp)
+  target_link_libraries(${name} PRIVATE hwy::hwy)
+  get_test_property(${name} ENVIRONMENT environment)
+  foreach(set AVX2 SSE4 EMU128)
+    add_test(NAME ${name}_${set} COMMAND ${name} "--gtest_filter=InstructionSet.*:${filter}")
+    set_tests_properties(${name}_${set} PROPERTIES TIMEOUT 600
+      ENVIRONMENT "${environment};LUMICUT_TEST_INSTRUCTION_SET=${set}")
+  endforeach()
+endfunction()
