@@ -74,7 +74,7 @@ class Batch {
       const size_t p = i / samples;
       const Vec3f to_viewer = -rays_[i].ray.dir;
       if (rays_[i].hit.geom == kNoId) {
-        sums_[p].radiance += scene_.environment_radiance(rays_[i].ray.dir);
+        if (!scene_.environment().hidden) sums_[p].radiance += scene_.environment_radiance(rays_[i].ray.dir);
         continue;
       }
       const SurfaceHit surface = scene_.surface(rays_[i]);
