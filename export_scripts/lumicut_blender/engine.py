@@ -158,9 +158,7 @@ class LumicutEngine(bpy.types.RenderEngine):
         if self.is_preview:
             return
         for line in report.lines(most_names=12):
-            self.report({"INFO"}, f"Lumicut: {line}")
-            if bpy.app.background:
-                print(f"lumicut: approximated: {line}", flush=True)
+            self.report({"INFO"}, f"Lumicut: {line}")  # printed, where there is no window
 
     def _follow(self, render, depsgraph, crop, height):
         """Polls until the frame is done; hands tiles over as they finish."""
