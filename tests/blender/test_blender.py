@@ -2,6 +2,7 @@
 
 Skipped where Blender is not installed; with a message, so that nobody takes it for passed.
 """
+import json
 import os
 import pathlib
 import re
@@ -230,6 +231,42 @@ class TheZip(Blender):
                              f"import bpy; bpy.ops.export_scene.lumicut(filepath={str(out)!r})", library=None)
         self.assertEqual(done.returncode, 0, done.stdout)
         self.assertTrue(out.exists())
+
+
+TOOLS = ("xvfb-run", "import", "xdotool")
+
+
+@unittest.skipUnless(all(map(shutil.which, TOOLS)), f"one of {', '.join(TOOLS)} is not installed: the interface is not tested")
+class Interface(Blender):
+    """One run with a window, under Xvfb. Screenshots stay in the build's blender_screenshots."""
+
+    def test_engine_render_cancel_and_viewport(self):
+        shots = BUILD / "blender_screenshots"
+        shutil.rmtree(shots, ignore_errors=True)
+        shots.mkdir(parents=True)
+        more = ("h.set_world((0.05, 0.06, 0.08)); g = h.material('Glass'); h.shader(g, 'ShaderNodeBsdfGlass'); "
+                "h.add_plane(0.6, 0.4, g, 'Pane').location = (1.2, -0.8, 0); scene.camera.location = (3.2, -4.2, 2.6); "
+                "scene.camera.rotation_euler = (1.14, 0, 0.65); scene.render.resolution_x, scene.render.resolution_y = 640, 480")
+        blend = make_room(self.home, more=more)
+        env = self.home.environment() | {"LUMICUT_UI_OUT": str(shots)}
+        done = subprocess.run(["xvfb-run", "-a", "-s", "-screen 0 1280x900x24", BLENDER, blend, "--addons", "lumicut_blender",
+                               "--window-geometry", "0", "0", "1280", "900", "--python", str(HERE / "ui_script.py")],
+                              env=env, cwd=self.home.path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                              errors="replace", timeout=PATIENCE)
+        self.assertTrue((shots / "result.json").exists(), done.stdout[-3000:])
+        result = json.loads((shots / "result.json").read_text())
+        sys.stderr.write(json.dumps(result, indent=1) + "\n")
+        self.assertTrue(result.get("ok"), result.get("failure"))
+        self.assertTrue(result["offered"])
+        self.assertEqual((result["render"], result["cancel"]), ("complete", "cancel"))
+        self.assertTrue(any("Glass" in note for note in result["notes"]))
+        self.assertEqual(result["levels"], 3)
+        # The interface's own timer went on while the worker rendered.
+        self.assertGreater(result["ticks_while_rendering"], 5)
+        self.assertTrue(result["object_moved"])
+        self.assertTrue(result["again"])
+        for name in ("panels", "render", "rendering", "viewport", "viewport_turned"):
+            self.assertGreater((shots / f"{name}.png").stat().st_size, 10000, name)
 
 
 if __name__ == "__main__":
