@@ -249,8 +249,8 @@ class Interface(Blender):
                 "scene.camera.rotation_euler = (1.14, 0, 0.65); scene.render.resolution_x, scene.render.resolution_y = 640, 480")
         blend = make_room(self.home, more=more)
         env = self.home.environment() | {"LUMICUT_UI_OUT": str(shots)}
-        done = subprocess.run(["xvfb-run", "-a", "-s", "-screen 0 1280x900x24", BLENDER, blend, "--addons", "lumicut_blender",
-                               "--window-geometry", "0", "0", "1280", "900", "--python", str(HERE / "ui_script.py")],
+        done = subprocess.run(["xvfb-run", "-a", "-s", "-screen 0 1500x1000x24", BLENDER, blend, "--addons", "lumicut_blender",
+                               "--window-geometry", "0", "0", "1500", "1000", "--python", str(HERE / "ui_script.py")],
                               env=env, cwd=self.home.path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                               errors="replace", timeout=PATIENCE)
         self.assertTrue((shots / "result.json").exists(), done.stdout[-3000:])

@@ -67,8 +67,7 @@ def steps():
     scene.render.engine = "BLENDER_WORKBENCH"
     yield from pause(1)
     # The engine, as the interface offers it.
-    items = [i.identifier for i in scene.render.bl_rna.properties["engine"].enum_items]
-    result["offered"] = "LUMICUT" in items or "LUMICUT" in str(bpy.types.RenderEngine.__subclasses__())
+    result["offered"] = any(getattr(cls, "bl_idname", "") == "LUMICUT" for cls in bpy.types.RenderEngine.__subclasses__())
     properties.spaces.active.context = "RENDER"
     scene.render.engine = "LUMICUT"
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=view, region=region(view)):
