@@ -10,6 +10,7 @@ packages=(
   libcgal-dev libgmp-dev libmpfr-dev                                    # geometry/ (a target of its own)
   libgtest-dev libgmock-dev libbenchmark-dev python3 python3-numpy      # tests and benchmarks
   binutils                                                              # a test reads the library's symbols
+  blender xvfb xauth xdotool imagemagick libgl1-mesa-dri                # the Blender add-on's tests, with and without a window
 )
 
 missing=()

@@ -54,14 +54,20 @@ def cycles(samples, seed=1, clamp=0.0, bounces=32):
     bpy.context.scene.cycles.sample_clamp_indirect = clamp
 
 
+def small(width):
+    bpy.context.scene.render.resolution_x, bpy.context.scene.render.resolution_y = width, width * 3 // 4
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("mode", choices=["reference", "table", "one"])
     parser.add_argument("--folder", type=pathlib.Path, required=True)
     parser.add_argument("--parts", type=int, default=4)
     parser.add_argument("--samples", type=int, default=1024)
+    parser.add_argument("--width", type=int, default=320)
     parser.add_argument("--lumicut", default="", help="one: integrator,samples,name=value,...")
     options = parser.parse_args(sys.argv[sys.argv.index("--") + 1:])
+    small(options.width)
     options.folder.mkdir(exist_ok=True)
     if options.mode == "reference":
         for part in range(options.parts):

@@ -244,10 +244,11 @@ class Interface(Blender):
         shots = BUILD / "blender_screenshots"
         shutil.rmtree(shots, ignore_errors=True)
         shots.mkdir(parents=True)
-        more = ("h.set_world((0.05, 0.06, 0.08)); g = h.material('Glass'); h.shader(g, 'ShaderNodeBsdfGlass'); "
-                "h.add_plane(0.6, 0.4, g, 'Pane').location = (1.2, -0.8, 0); scene.camera.location = (3.2, -4.2, 2.6); "
-                "scene.camera.rotation_euler = (1.14, 0, 0.65); scene.render.resolution_x, scene.render.resolution_y = 640, 480")
-        blend = make_room(self.home, more=more)
+        blend = self.home.path / "room.blend"
+        done = self.home.run("--factory-startup", "--addons", "lumicut_blender", "--python-exit-code", 7, "-P",
+                             ROOT / "export_scripts/scenes/blender_indirect_room.py", "--",
+                             "--output", blend, "--detail", 0, "--width", 640, "--height", 480)
+        self.assertEqual(done.returncode, 0, done.stdout)
         env = self.home.environment() | {"LUMICUT_UI_OUT": str(shots)}
         done = subprocess.run(["xvfb-run", "-a", "-s", "-screen 0 1500x1000x24", BLENDER, blend, "--addons", "lumicut_blender",
                                "--window-geometry", "0", "0", "1500", "1000", "--python", str(HERE / "ui_script.py")],
@@ -259,7 +260,7 @@ class Interface(Blender):
         self.assertTrue(result.get("ok"), result.get("failure"))
         self.assertTrue(result["offered"])
         self.assertEqual((result["render"], result["cancel"]), ("complete", "cancel"))
-        self.assertTrue(any("Glass" in note for note in result["notes"]))
+        self.assertTrue(any("Gloss" in note and "floor" in note for note in result["notes"]))
         self.assertEqual(result["levels"], 3)
         # The interface's own timer went on while the worker rendered.
         self.assertGreater(result["ticks_while_rendering"], 5)
