@@ -111,7 +111,7 @@ class LumicutEngine(bpy.types.RenderEngine):
         width, height = self.resolution_x, self.resolution_y
         crop = crop_of(scene.render, width, height)
         self._tell(report)
-        if export_requests:
+        if export_requests and not self.is_preview:
             export.write_scene(export_requests[0], data, width, height, settings)
             self._blank(depsgraph, crop)
             return
@@ -154,9 +154,9 @@ class LumicutEngine(bpy.types.RenderEngine):
         return 32 if side <= 320 else 64 if side <= 800 else 128
 
     def _tell(self, report):
-        runtime.last["notes"] = report.lines()
         if self.is_preview:
             return
+        runtime.last["notes"] = report.lines()
         for line in report.lines(most_names=12):
             self.report({"INFO"}, f"Lumicut: {line}")  # printed, where there is no window
 
