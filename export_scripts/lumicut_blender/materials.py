@@ -6,6 +6,7 @@ GGX distribution with the same width about the mirror direction.
 """
 import dataclasses
 
+import bpy
 import numpy as np
 
 from . import library
@@ -175,7 +176,15 @@ class SurfaceReader(Evaluator):
         else:
             f0 = self.multiply(value("Specular"), Value(0.08))
         dielectric = self.complement(metallic)
-        diffuse = self.multiply(self.multiply(base, dielectric), self.complement(transmission))
+        rough = self.roughness(node, stack)
+        if bpy.app.version < (4, 0, 0) and not base.is_zero() and not dielectric.is_zero():
+            # Burley's diffuse, which Blender gave up with 4.0: 0.5 to 1.1 times Lambert by direction. Its albedo under
+            # even light from all sides, integrated numerically, is linear in the roughness to 0.001.
+            self.note("", "Principled's diffuse part (Burley) as Lambert of the same mean albedo")
+            lambert = self.multiply(base, Value(0.953 + 0.1123 * rough))
+        else:
+            lambert = base
+        diffuse = self.multiply(self.multiply(lambert, dielectric), self.complement(transmission))
         specular = self.add(self.multiply(metallic, base), self.multiply(dielectric, f0))
         emission = self.multiply(value("Emission", "Emission Color"), value("Emission Strength"))
         opacity = value("Alpha")
@@ -184,7 +193,7 @@ class SurfaceReader(Evaluator):
             return Surface(emission=emission, opacity=ZERO, clear=emission.is_zero())
         if not transmission.is_zero():
             self.note("weak transmission", "Principled features left out")
-        return Surface(diffuse, specular, self.roughness(node, stack), emission, opacity)
+        return Surface(diffuse, specular, rough, emission, opacity)
 
 
 @dataclasses.dataclass
@@ -243,8 +252,9 @@ class Materials:
             if value.picture is not None:
                 pictures[slot] = value.picture
         for slot in ("diffuse", "specular"):
-            if (factors[slot] > 1).any():
+            if (factors[slot] > 1.07).any():  # white by Burley's albedo goes without saying
                 self.report.note(name, "Colours above 1 cut to 1")
+            if (factors[slot] > 1).any():
                 factors[slot] = np.minimum(factors[slot], 1)
             getattr(m, slot)[:] = factors[slot].tolist()
         m.emission[:] = factors["emission"].tolist()

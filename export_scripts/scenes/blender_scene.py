@@ -45,6 +45,18 @@ def link(ob):
     return ob
 
 
+def matte(name, colour):
+    """Lambert: the same in all renderers and versions, which Principled's diffuse part is not."""
+    m = bpy.data.materials.new(name)
+    m.use_nodes = True
+    tree = m.node_tree
+    tree.nodes.clear()
+    output, base = tree.nodes.new("ShaderNodeOutputMaterial"), tree.nodes.new("ShaderNodeBsdfDiffuse")
+    base.inputs["Color"].default_value = (*colour, 1)
+    tree.links.new(base.outputs[0], output.inputs["Surface"])
+    return m
+
+
 def principled(name, colour, roughness=1.0, specular=0.0, metallic=0.0, emission=0.0):
     m = bpy.data.materials.new(name)
     m.use_nodes = True
