@@ -13,6 +13,11 @@ TYPES = {"POINT": library.POINT, "SPOT": library.SPOT, "SUN": library.SUN}
 AREA_TYPES = {"SQUARE": library.RECTANGLE, "RECTANGLE": library.RECTANGLE, "DISK": library.DISK, "ELLIPSE": library.DISK}
 
 
+# Measured: Cycles 3.4.1 has L = P/4A, 4.3.2 L = P/πA (P watt in all, as its name says). Versions between were not
+# there to measure.
+AREA_IS_LAMBERTIAN = (4, 3, 0)
+
+
 def emission_of(light, images, report):
     """Colour times strength of a lamp's own nodes; 1 where it has none."""
     if not light.use_nodes or light.node_tree is None:
@@ -73,6 +78,8 @@ def convert_light(name, light, matrix, images, report):
         out.u[:], out.v[:] = u.tolist(), v.tolist()
         out.spread = light.spread if hasattr(light, "spread") else math.pi
         out.direction[:] = [0.0, 0.0, 0.0]
+        if bpy.app.version >= AREA_IS_LAMBERTIAN:
+            out.value = value * 4 / math.pi
         return out
     out.type = TYPES[light.type]
     if light.type == "SUN":

@@ -23,7 +23,7 @@ class Registration(unittest.TestCase):
         addon_utils.enable("lumicut_blender")
 
     def engines(self):
-        return [cls.bl_idname for cls in bpy.types.RenderEngine.__subclasses__() if cls.is_registered]
+        return [getattr(cls, "bl_idname", "") for cls in bpy.types.RenderEngine.__subclasses__() if cls.is_registered]
 
     def test_it_goes_away_and_comes_back_and_renders_still(self):
         for _ in range(3):

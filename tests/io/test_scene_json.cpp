@@ -181,18 +181,19 @@ TEST(SceneJson, ATextureMaySayThatItEndsAndIsNotFiltered) {
   image.layers = {{"radiance", 3, {1, 1, 1, 1, 1, 1}}};
   write_exr(folder / "a.exr", image, false);
   json scene = json::parse(kScene);
-  scene["materials"] = {{{"name", "ends"}, {"diffuse_texture", {{"file", "a.exr"}, {"clamp", true}}}},
-                        {{"name", "plain"}, {"diffuse_texture", "a.exr"}},
-                        {{"name", "sharp"}, {"diffuse_texture", {{"file", "a.exr"}, {"nearest", true}}}}};
+  const size_t first = scene["materials"].size();
+  scene["materials"].push_back({{"name", "ends"}, {"diffuse_texture", {{"file", "a.exr"}, {"clamp", true}}}});
+  scene["materials"].push_back({{"name", "plain"}, {"diffuse_texture", "a.exr"}});
+  scene["materials"].push_back({{"name", "sharp"}, {"diffuse_texture", {{"file", "a.exr"}, {"nearest", true}}}});
   const auto flags_of = [&](const SceneData& data, size_t material) {
-    return data.textures.at(static_cast<size_t>(data.materials.at(material).values.diffuse_texture - 1)).flags;
+    return data.textures.at(static_cast<size_t>(data.materials.at(first + material).values.diffuse_texture - 1)).flags;
   };
   const SceneData data = read_scene(folder.write("scene.json", scene.dump()));
   EXPECT_EQ(data.textures.size(), 3u) << "one file, three ways to read it";
   EXPECT_EQ(flags_of(data, 0), uint32_t{LUMICUT_CLAMP});
   EXPECT_EQ(flags_of(data, 1), 0u);
   EXPECT_EQ(flags_of(data, 2), uint32_t{LUMICUT_NEAREST});
-  scene["materials"][0]["diffuse_texture"] = {{"file", "a.exr"}, {"mirror", true}};
+  scene["materials"][first]["diffuse_texture"] = {{"file", "a.exr"}, {"mirror", true}};
   const std::string file = folder.write("scene.json", scene.dump());
   expect_in(error_of([&] { read_scene(file); }), {"mirror"});
 }
