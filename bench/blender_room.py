@@ -21,10 +21,10 @@ import helpers as h  # noqa: E402
 
 # What is tried for each budget: the clamp shrinks and lights grow with time.
 SETTINGS = {
-    1: [("illumination_cut", 1, {"vpls": 2000, "error": 0.1}), ("stochastic_lightcuts", 1, {"vpls": 5000, "lights": 12})],
-    5: [("illumination_cut", 1, {"vpls": 10000, "error": 0.05})],
-    20: [("illumination_cut", 2, {"vpls": 60000, "error": 0.03, "clamp_relative": 0.03})],
-    60: [("illumination_cut", 4, {"vpls": 200000, "error": 0.02, "clamp_relative": 0.015})],
+    1: [("stochastic_lightcuts", 1, {"vpls": 3000, "lights": 16})],
+    5: [("illumination_cut", 4, {"vpls": 60000, "error": 0.03, "clamp_relative": 0.03})],
+    20: [("illumination_cut", 8, {"vpls": 300000, "error": 0.015, "clamp_relative": 0.015})],
+    60: [("illumination_cut", 16, {"vpls": 800000, "error": 0.01, "clamp_relative": 0.008})],
 }
 
 
@@ -37,15 +37,22 @@ def measured(configure):
     return image, after.user + after.system - before.user - before.system, time.perf_counter() - wall
 
 
-def errors(image, reference):
-    """RMSE / mean, and the mean's own deviation; both over all pixels and channels."""
-    return float(np.sqrt(((image - reference) ** 2).mean()) / reference.mean()), float(image.mean() / reference.mean() - 1)
+class Reference:
+    """The mean of independent parts. Its own noise, known from how they differ, is taken off the errors in quadrature."""
 
+    def __init__(self, parts):
+        self.parts, self.image = parts, np.mean(parts, 0)
 
-def smooth_error(image, reference, side=8):
-    """RMSE / mean of blocks of pixels: noise averages out, what remains is bias."""
-    a, b = h.blocks(image, side), h.blocks(reference, side)
-    return float(np.sqrt(((a - b) ** 2).mean()) / b.mean())
+    def error(self, image, side=1):
+        """(RMSE / mean, noise of the reference / mean) of blocks of pixels: in large ones noise averages out, bias stays."""
+        a, b = h.blocks(image, side), h.blocks(self.image, side)
+        noise2 = np.mean([((h.blocks(p, side) - b) ** 2).mean() for p in self.parts]) / max(1, len(self.parts) - 1)
+        return float(np.sqrt(max(0.0, ((a - b) ** 2).mean() - noise2)) / b.mean()), float(np.sqrt(noise2) / b.mean())
+
+    def row(self, name, image, cpu):
+        pixel, block = self.error(image)[0], self.error(image, 8)[0]
+        print(f"| {name} | {cpu:.1f} | {100 * pixel:.1f} % | {100 * block:.1f} % | "
+              f"{100 * (image.mean() / self.image.mean() - 1):+.1f} % |", flush=True)
 
 
 def cycles(samples, seed=1, clamp=0.0, bounces=32):
@@ -78,17 +85,14 @@ def main():
             np.save(path, image)
             print(f"part {part}: {cpu:.0f} CPU s, {wall:.0f} s", flush=True)
         return
-    parts = [np.load(p) for p in sorted(options.folder.glob("*.npy"))]
-    reference = np.mean(parts, 0)
-    noise = np.sqrt(np.mean([((p - reference) ** 2).mean() for p in parts]) / max(1, len(parts) - 1)) / reference.mean()
-    print(f"reference: {len(parts)} parts, its own noise {100 * noise:.2f} % RMSE/mean")
+    reference = Reference([np.load(p) for p in sorted(options.folder.glob("*.npy"))])
+    _, noise = reference.error(reference.image)
+    print(f"reference: {len(reference.parts)} parts, its own noise {100 * noise:.1f} % RMSE/mean")
 
     def lumicut(integrator, samples, values):
         image, cpu, wall = measured(lambda: h.set_lumicut(integrator, samples, **values))
-        rmse, bias = errors(image, reference)
         text = ", ".join(f"{k}={v:g}" for k, v in values.items())
-        print(f"| Lumicut `{integrator}`, {samples} spp, {text} | {cpu:.1f} | {100 * rmse:.1f} % | "
-              f"{100 * smooth_error(image, reference):.1f} % | {100 * bias:+.1f} % |", flush=True)
+        reference.row(f"Lumicut `{integrator}`, {samples} spp, {text}", image, cpu)
         return cpu
 
     if options.mode == "one":
@@ -107,9 +111,7 @@ def main():
         samples = max(1, round((spent - fixed) / rate))
         for clamp in (0.0, 10.0):
             image, cpu, _ = measured(lambda: cycles(samples, 1, clamp))
-            rmse, bias = errors(image, reference)
-            print(f"| Cycles, {samples} spp, {'clamp 10, as it comes' if clamp else 'no clamp'} | {cpu:.1f} | {100 * rmse:.1f} % | "
-                  f"{100 * smooth_error(image, reference):.1f} % | {100 * bias:+.1f} % |", flush=True)
+            reference.row(f"Cycles, {samples} spp, {'clamp 10, as it comes' if clamp else 'no clamp'}", image, cpu)
 
 
 main()
