@@ -28,11 +28,11 @@ if [ ${#missing[@]} -gt 0 ]; then
   chroot "$tree" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}"
 fi
 
-cleanup() { umount "$tree/proc" "$tree/dev" "$tree/src" 2>/dev/null || true; }
+cleanup() { umount -l "$tree/proc" "$tree/dev" "$tree/src" 2>/dev/null || true; }
 trap cleanup EXIT
 mkdir -p "$tree/src" "$tree/build"
 mountpoint -q "$tree/proc" || mount -t proc proc "$tree/proc"
-mountpoint -q "$tree/dev" || mount --rbind /dev "$tree/dev" 2>/dev/null || true
+mountpoint -q "$tree/dev" || mount --bind /dev "$tree/dev"  # not its submounts: unmounting them would reach the host's
 mountpoint -q "$tree/src" || mount --bind -o ro "$root" "$tree/src"
 
 chroot "$tree" cmake -S /src -B /build -G Ninja -DCMAKE_BUILD_TYPE=Release \
