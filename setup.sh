@@ -11,6 +11,7 @@ packages=(
   libgtest-dev libgmock-dev libbenchmark-dev python3 python3-numpy      # tests and benchmarks
   binutils                                                              # a test reads the library's symbols
   chromium                                                              # a test opens the report's page
+  blender xvfb xauth xdotool imagemagick libgl1-mesa-dri                # the Blender add-on's tests, with and without a window
 )
 
 missing=()

@@ -13,7 +13,9 @@ namespace lumicut {
 namespace {
 
 static_assert(sizeof(Ray) == sizeof(RTCRay) && offsetof(Ray, tfar) == offsetof(RTCRay, tfar));
-static_assert(sizeof(Hit) == sizeof(RTCHit) && offsetof(Hit, inst) == offsetof(RTCHit, instID));
+// Embree 4.3 has another number behind these fields (instPrimID), which is not read here.
+static_assert(sizeof(Hit) <= sizeof(RTCHit) && offsetof(Hit, inst) == offsetof(RTCHit, instID));
+static_assert(offsetof(RayHit, hit) == offsetof(RTCRayHit, hit));
 
 // What Embree reports while it builds, from any of its threads.
 struct DeviceState {
@@ -86,15 +88,15 @@ class EmbreeAccel final : public Accel {
 
   void intersect(std::span<RayHit> rays) const override {
     embree::Context context(false);
-    RTCRayHit local;  // Embree wants 16-byte alignment, which a host's array need not have
+    RTCRayHit local{};  // Embree wants 16-byte alignment, which a host's array need not have
     for (RayHit& r : rays) {
       r.hit = {};
       if (!is_traceable(r.ray)) continue;
-      std::memcpy(&local, &r, sizeof(local));
+      std::memcpy(static_cast<void*>(&local), &r, sizeof(r));
       local.ray.tnear = std::max(local.ray.tnear, 0.0f);
       context.intersect(scene_, &local);
       local.ray.tnear = r.ray.tnear;
-      if (local.hit.geomID != RTC_INVALID_GEOMETRY_ID) std::memcpy(static_cast<void*>(&r), &local, sizeof(local));
+      if (local.hit.geomID != RTC_INVALID_GEOMETRY_ID) std::memcpy(static_cast<void*>(&r), &local, sizeof(r));
     }
   }
 

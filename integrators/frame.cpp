@@ -125,7 +125,7 @@ class Batch {
     const Vec3f to_viewer = -ray.ray.dir;
     PixelSums& sum = sums_[p];
     if (ray.hit.geom == kNoId) {
-      sum.radiance += scene_.environment_radiance(ray.ray.dir);
+      if (!scene_.environment().hidden) sum.radiance += scene_.environment_radiance(ray.ray.dir);
       return false;
     }
     const SurfaceHit surface = scene_.surface(ray);

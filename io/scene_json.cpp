@@ -261,9 +261,23 @@ class SceneReader {
     const auto texture = [&](const char* key, int32_t& out, TextureUse use) {
       const auto value = object.find(key);
       if (!value) return;
-      out = value->raw().is_null() ? 0
-                                   : textures_.get(resolve(*value), use, 0,
-                                                   fmt::format("material \"{}\" ({}: {})", name, path_, value->path()));
+      const auto user = fmt::format("material \"{}\" ({}: {})", name, path_, value->path());
+      if (value->raw().is_null()) {
+        out = 0;
+      } else if (value->raw().is_object()) {
+        JsonObject keys(*value);
+        const auto file = keys.need("file");
+        uint32_t flags = 0;
+        const auto flag = [&](const char* word, uint32_t bit) {
+          if (auto given = keys.find(word); given && given->boolean()) flags |= bit;
+        };
+        flag("clamp", LUMICUT_CLAMP);
+        flag("nearest", LUMICUT_NEAREST);
+        keys.finish();
+        out = textures_.get(resolve(file), use, flags, user);
+      } else {
+        out = textures_.get(resolve(*value), use, 0, user);
+      }
     };
     texture("diffuse_texture", m.diffuse_texture, TextureUse::colour);
     texture("specular_texture", m.specular_texture, TextureUse::colour);
@@ -580,6 +594,13 @@ class SceneReader {
         for (size_t k = 0; k < 3; ++k) sum += turn[i * 3 + k] * stand[k * 3 + j];
         environment.world_to_map[i * 3 + j] = static_cast<float>(sum);
       }
+    if (auto given = object.find("world_to_map")) {
+      if (object.has("rotation")) value.fail("give either \"rotation\" or \"world_to_map\"");
+      const auto numbers = given->numbers(9, -1.001, 1.001);
+      std::transform(numbers.begin(), numbers.end(), environment.world_to_map,
+                     [](double x) { return static_cast<float>(x); });
+    }
+    if (auto hidden = object.find("hidden"); hidden && hidden->boolean()) environment.flags |= LUMICUT_HIDDEN;
     object.finish();
     scene_.environment = environment;
   }

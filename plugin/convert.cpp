@@ -211,8 +211,10 @@ Environment to_environment(const lumicut_environment& in) {
   const Checked c("lumicut_environment");
   c.integer("group", in.group, 0, kMaxGroup);
   c.not_negative("color", in.color);
+  c.flags("flags", in.flags, LUMICUT_HIDDEN);
   Environment e;
   e.group = in.group;
+  e.hidden = (in.flags & LUMICUT_HIDDEN) != 0;
   e.color = vec(in.color);
   e.texture = texture_index(c, "texture", in.texture);
   bool given = false;

@@ -43,7 +43,7 @@ LUMICUT_DESCRIPTOR(lumicut_mesh, F(struct_size), F(mask), F(positions), F(normal
                    F(triangle_count), F(materials), F(transforms), F(transform_count), F(material), F(group));
 LUMICUT_DESCRIPTOR(lumicut_light, F(struct_size), F(type), F(unit), F(group), F(color), F(value), F(position),
                    F(radius), F(direction), F(angle), F(u), F(blend), F(v), F(spread), F(spot_cosine));
-LUMICUT_DESCRIPTOR(lumicut_environment, F(struct_size), F(group), F(color), F(texture), F(world_to_map));
+LUMICUT_DESCRIPTOR(lumicut_environment, F(struct_size), F(group), F(color), F(texture), F(world_to_map), F(flags));
 LUMICUT_DESCRIPTOR(lumicut_camera, F(struct_size), F(orthographic), F(to_world), F(fov_y), F(height), F(shift),
                    F(near_clip), F(far_clip), F(pixel_aspect), F(lens_radius), F(focus_distance));
 LUMICUT_DESCRIPTOR(lumicut_trace, F(struct_size), F(batch), F(intersect), F(occluded), F(user));

@@ -30,6 +30,7 @@ struct Environment {
   int32_t texture = -1;
   uint32_t group = 0;
   float world_to_map[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  bool hidden = false;  // from camera rays alone
   bool black() const { return !(max_component(color) > 0.0f); }
 };
 

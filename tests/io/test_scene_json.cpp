@@ -160,6 +160,44 @@ TEST(SceneJson, TheEnvironmentTurnsWithUpAndRotation) {
   EXPECT_NEAR(map(scene, 0, 1, 0)[0], 1, 1e-6);
 }
 
+TEST(SceneJson, TheEnvironmentMayHaveARotationOfItsOwnAndBeHidden) {
+  const json turn = {0, 1, 0, -1, 0, 0, 0, 0, 1};
+  SceneData scene = changed([&](json& s) { s["environment"] = {{"world_to_map", turn}, {"hidden", true}}; });
+  for (size_t k = 0; k < 9; ++k) EXPECT_EQ(scene.environment->world_to_map[k], turn[k].get<float>());
+  EXPECT_EQ(scene.environment->flags, uint32_t{LUMICUT_HIDDEN});
+  scene = changed([](json& s) { s["environment"] = {{"hidden", false}}; });
+  EXPECT_EQ(scene.environment->flags, 0u);
+  json both = json::parse(kScene);
+  both["environment"] = {{"world_to_map", turn}, {"rotation", 10}};
+  const TemporaryFolder folder;
+  const std::string file = folder.write("scene.json", both.dump());
+  expect_in(error_of([&] { read_scene(file); }), {"environment", "rotation", "world_to_map"});
+}
+
+TEST(SceneJson, ATextureMaySayThatItEndsAndIsNotFiltered) {
+  const TemporaryFolder folder;
+  Image image;
+  image.width = 2, image.height = 1;
+  image.layers = {{"radiance", 3, {1, 1, 1, 1, 1, 1}}};
+  write_exr(folder / "a.exr", image, false);
+  json scene = json::parse(kScene);
+  const size_t first = scene["materials"].size();
+  scene["materials"].push_back({{"name", "ends"}, {"diffuse_texture", {{"file", "a.exr"}, {"clamp", true}}}});
+  scene["materials"].push_back({{"name", "plain"}, {"diffuse_texture", "a.exr"}});
+  scene["materials"].push_back({{"name", "sharp"}, {"diffuse_texture", {{"file", "a.exr"}, {"nearest", true}}}});
+  const auto flags_of = [&](const SceneData& data, size_t material) {
+    return data.textures.at(static_cast<size_t>(data.materials.at(first + material).values.diffuse_texture - 1)).flags;
+  };
+  const SceneData data = read_scene(folder.write("scene.json", scene.dump()));
+  EXPECT_EQ(data.textures.size(), 3u) << "one file, three ways to read it";
+  EXPECT_EQ(flags_of(data, 0), uint32_t{LUMICUT_CLAMP});
+  EXPECT_EQ(flags_of(data, 1), 0u);
+  EXPECT_EQ(flags_of(data, 2), uint32_t{LUMICUT_NEAREST});
+  scene["materials"][first]["diffuse_texture"] = {{"file", "a.exr"}, {"mirror", true}};
+  const std::string file = folder.write("scene.json", scene.dump());
+  expect_in(error_of([&] { read_scene(file); }), {"mirror"});
+}
+
 TEST(SceneJson, MaterialsOfAnObjCanBeChangedByName) {
   const TemporaryFolder folder;
   folder.write("m.mtl", "newmtl floor\nKd 0.2 0.2 0.2\nNs 5\n\nnewmtl wall\nKd 0.7 0.7 0.7\n");

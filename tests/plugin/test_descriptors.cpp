@@ -208,9 +208,9 @@ TEST(Abi, DescriptorsOfAnySizeAreReadByTheGrowthRule) {
   {
     using T = lumicut_environment;
     auto d = make<T>();
-    d.color[0] = 1, d.world_to_map[0] = d.world_to_map[4] = d.world_to_map[8] = 1;
+    d.color[0] = 1, d.flags = LUMICUT_HIDDEN, d.world_to_map[0] = d.world_to_map[4] = d.world_to_map[8] = 1;
     check_input("lumicut_environment", bytes_of(d),
-                {F(T, struct_size), F(T, group), F(T, color), F(T, texture), F(T, world_to_map)},
+                {F(T, struct_size), F(T, group), F(T, color), F(T, texture), F(T, world_to_map), F(T, flags)},
                 [&](const void* p) { return lumicut_scene_set_environment(s.get(), static_cast<const T*>(p)); });
   }
   {

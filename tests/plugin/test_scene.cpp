@@ -116,6 +116,39 @@ TEST(Scene, WithoutGeometryTheEnvironmentIsSeen) {
   for (const float v : render(integrator(device, 10), s)) ASSERT_EQ(v, 0.5f);
 }
 
+TEST(Scene, AHiddenEnvironmentLightsWhatTheCameraSeesAndIsBlackItself) {
+  const api::Device device(1);
+  const api::Integrator i = integrator(device, 500);
+  api::Scene s = scene(device, false);
+  s.set_lights({});
+  auto e = make<lumicut_environment>();
+  e.color[0] = e.color[1] = e.color[2] = 0.5f;
+  s.set_environment(e);
+  s.commit();
+  const auto shown = render(i, s);
+  e.flags = LUMICUT_HIDDEN;
+  s.set_environment(e);
+  s.commit();
+  const auto hidden = render(i, s);
+  int background = 0, lit = 0;
+  for (size_t p = 0; p < shown.size(); ++p) {
+    if (hidden[p] != shown[p]) {
+      ASSERT_EQ(hidden[p], 0.0f);
+      ASSERT_EQ(shown[p], 0.5f);
+      ++background;
+    } else if (hidden[p] > 0) {
+      ++lit;
+    }
+  }
+  EXPECT_GT(background + lit, 0);
+  EXPECT_GT(lit, 0);
+  api::Scene empty(device);
+  empty.set_environment(e);
+  empty.set_camera(camera());
+  empty.commit();
+  for (const float v : render(i, empty)) ASSERT_EQ(v, 0.0f);
+}
+
 TEST(Scene, WithoutLightsItIsBlack) {
   const api::Device device(1);
   api::Scene s = scene(device, false);

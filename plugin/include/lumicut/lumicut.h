@@ -210,7 +210,9 @@ typedef struct lumicut_environment {
   int32_t texture;      /* 1 + index, latitude-longitude; 0: constant */
   float world_to_map[9]; /* row-major rotation; all 0: identity. In map space z is up: u = 1/2 - atan2(y,x)/2pi,
                             v = 1/2 + atan2(z,hypot(x,y))/pi */
+  uint32_t flags;       /* LUMICUT_HIDDEN: it lights the scene, but camera rays that leave it bring black */
 } lumicut_environment;
+enum { LUMICUT_HIDDEN = 1 };
 
 typedef struct lumicut_camera {
   uint32_t struct_size;

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Lumicut in Blender: a render engine of many lights. docs/blender.md tells how to install and use it."""
+bl_info = {
+    "name": "Lumicut",
+    "author": "The Lumicut authors",
+    "version": (1, 0, 0),
+    "blender": (3, 4, 0),
+    "location": "Render Properties > Render Engine > Lumicut",
+    "description": "Global illumination from many virtual lights, without noise",
+    "category": "Render",
+}
+
+if "bpy" in locals():  # reloaded by the host: its parts, too, from the bottom up
+    import importlib
+    for _part in (library, report, scene_data, nodes, materials, lights, collect, runtime, properties, export,  # noqa: F821
+                  viewport, engine, preferences, panels):  # noqa: F821
+        importlib.reload(_part)
+else:
+    from . import (collect, engine, export, library, lights, materials, nodes, panels, preferences, properties,  # noqa: F401
+                   report, runtime, scene_data, viewport)
+
+import bpy  # noqa: E402, F401
+
+
+def register():
+    bpy.utils.register_class(preferences.LumicutPreferences)
+    if runtime.load() is None:
+        print(f"lumicut: {runtime.failure()}", flush=True)
+    properties.register()
+    engine.register()
+    panels.register()
+
+
+def unregister():
+    panels.unregister()
+    engine.unregister()
+    properties.unregister()
+    runtime.release()
+    bpy.utils.unregister_class(preferences.LumicutPreferences)

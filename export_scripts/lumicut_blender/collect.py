@@ -1,0 +1,343 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Collects a dependency graph into scene_data.SceneData: meshes, instances, materials, lamps, world, camera.
+
+Arrays are filled by foreach_get in the type that Blender stores, which is a memory copy. A mesh is converted once for
+each set of materials; its instances are transforms.
+"""
+import math
+
+import bpy
+import numpy as np
+
+from . import library, lights
+from .materials import Materials
+from .report import Report
+from .scene_data import Mesh, SceneData, is_flat
+
+AS_MESH = {"CURVE", "FONT", "META", "SURFACE"}  # a MESH item follows for each
+LEFT_OUT = {"VOLUME": "Volumes left out", "CURVES": "Hair and curve objects left out",
+            "POINTCLOUD": "Point clouds left out", "GPENCIL": "Grease pencil left out",
+            "GREASEPENCIL": "Grease pencil left out"}
+
+
+class Cancelled(Exception):
+    """The user asked to stop while Python was at work."""
+
+
+def fetch(collection, attribute, count, width, dtype):
+    out = np.empty(count * width, dtype)
+    collection.foreach_get(attribute, out)
+    return out.reshape(count, width) if width > 1 else out
+
+
+def rows(matrix):
+    """The upper 3x4 of a matrix, row-major."""
+    return [c for row in matrix[:3] for c in row]
+
+
+def corner_vertices(mesh, count):
+    attribute = mesh.attributes.get(".corner_vert")
+    if attribute is not None:  # 3.6 and later
+        return fetch(attribute.data, "value", count, 1, np.int32)
+    return fetch(mesh.loops, "vertex_index", count, 1, np.int32)
+
+
+def vertex_positions(mesh):
+    attribute = mesh.attributes.get("position")
+    if attribute is not None:  # 3.5 and later
+        return fetch(attribute.data, "vector", len(mesh.vertices), 3, np.float32)
+    return fetch(mesh.vertices, "co", len(mesh.vertices), 3, np.float32)
+
+
+def normals_of(mesh, corners):
+    """("flat", None), ("vertex", (n, 3)) or ("corner", (loops, 3))."""
+    vertices, loops, polygons = len(mesh.vertices), len(corners), len(mesh.polygons)
+    if hasattr(mesh, "normals_domain"):  # 4.1 and later
+        domain = mesh.normals_domain
+        if domain == "FACE":
+            return "flat", None
+        if domain == "POINT":
+            return "vertex", fetch(mesh.vertex_normals, "vector", vertices, 3, np.float32)
+        return "corner", fetch(mesh.corner_normals, "vector", loops, 3, np.float32)
+    if mesh.has_custom_normals or mesh.use_auto_smooth:
+        mesh.calc_normals_split()
+        return "corner", fetch(mesh.loops, "normal", loops, 3, np.float32)
+    smooth = fetch(mesh.polygons, "use_smooth", polygons, 1, bool)
+    if not smooth.any():
+        return "flat", None
+    of_vertices = fetch(mesh.vertices, "normal", vertices, 3, np.float32)
+    if smooth.all():
+        return "vertex", of_vertices
+    of_polygons = fetch(mesh.polygons, "normal", polygons, 3, np.float32)
+    counts = fetch(mesh.polygons, "loop_total", polygons, 1, np.int32)
+    flat_corners = np.repeat(~smooth, counts)
+    return "corner", np.where(flat_corners[:, None], np.repeat(of_polygons, counts, 0), of_vertices[corners])
+
+
+class MeshReader:
+    """One evaluated mesh to arrays. `materials`: the numbers of its slots, in order."""
+
+    def __init__(self, name, mesh, numbers, materials, report):
+        self.name, self.mesh, self.numbers, self.materials, self.report = name, mesh, numbers, materials, report
+
+    def read(self):
+        """scene_data.Mesh without instances, or None for one without faces."""
+        mesh = self.mesh
+        mesh.calc_loop_triangles()
+        triangles = len(mesh.loop_triangles)
+        if triangles == 0:
+            return None
+        loops = len(mesh.loops)
+        corners = corner_vertices(mesh, loops)
+        tri_corners = fetch(mesh.loop_triangles, "loops", triangles, 3, np.int32)
+        positions = vertex_positions(mesh)
+        kind, normals = normals_of(mesh, corners)
+        slot_of_triangle = self._slots(triangles)
+        numbers = np.array(self.numbers, np.uint32)
+        used = np.unique(slot_of_triangle) if slot_of_triangle is not None else np.array([0])
+        out = Mesh(self.name, positions, tri_corners)
+        if slot_of_triangle is None or len(used) == 1:
+            out.material = int(numbers[used[0]])
+        else:
+            out.materials = numbers[slot_of_triangle]
+        uvs = self._uvs(loops, corners, positions, tri_corners, slot_of_triangle, used)
+        bad = ~np.isfinite(positions).all(1)
+        if bad.any():
+            self.report.note(self.name, "Vertices that are not finite, moved to the origin")
+            positions[bad] = 0
+        if uvs is None and kind != "corner":
+            out.indices = corners[tri_corners]
+            out.normals = normals
+        else:  # a vertex for each corner of a face
+            out.positions = positions[corners]
+            out.uvs = uvs
+            out.normals = normals[corners] if kind == "vertex" else normals
+        return out
+
+    def _slots(self, triangles):
+        """Slot of each triangle; None: all the first."""
+        mesh, count = self.mesh, len(self.numbers)
+        if count < 2:
+            return None
+        attribute = mesh.attributes.get("material_index")  # 3.5 and later; absent: all 0
+        if attribute is not None and attribute.domain == "FACE":
+            of_polygon = fetch(attribute.data, "value", len(mesh.polygons), 1, np.int32)
+        elif bpy.app.version >= (3, 5, 0):
+            return None
+        else:
+            of_polygon = fetch(mesh.polygons, "material_index", len(mesh.polygons), 1, np.int32)
+        if not of_polygon.any():
+            return None
+        if hasattr(mesh, "loop_triangle_polygons"):  # 4.1 and later
+            polygon = fetch(mesh.loop_triangle_polygons, "value", triangles, 1, np.int32)
+        else:
+            polygon = fetch(mesh.loop_triangles, "polygon_index", triangles, 1, np.int32)
+        return np.clip(of_polygon, 0, count - 1)[polygon]
+
+    def _layer(self, name, loops):
+        layers = self.mesh.uv_layers
+        layer = layers.get(name) if name else next((l for l in layers if l.active_render), layers.active)
+        if layer is None:
+            self.report.note(self.name, f"Meshes without the UV map \"{name}\" that a texture wants"
+                             if name else "Meshes without UV maps, under textures")
+            return np.zeros((loops, 2), np.float32)
+        if hasattr(layer, "uv"):  # 3.5 and later
+            return fetch(layer.uv, "vector", loops, 2, np.float32)
+        return fetch(layer.data, "uv", loops, 2, np.float32)
+
+    def _uvs(self, loops, corners, positions, tri_corners, slot_of_triangle, used):
+        """Texture coordinates a corner, each under the mapping of its face's material; None: no textures."""
+        wanted = {}
+        for slot in used:
+            converted = self.materials.converted[self.numbers[slot]]
+            if converted.pictures:
+                wanted.setdefault(converted.mapping, []).append(slot)
+        if not wanted:
+            return None
+        out = np.zeros((loops, 2), np.float32)
+        for mapping, slots in wanted.items():
+            if mapping.source == "UV":
+                base = self._layer(mapping.uv_map, loops)
+            else:  # Generated: the bounding box, from 0 to 1
+                low, high = positions.min(0), positions.max(0)
+                base = ((positions - low) / np.where(high > low, high - low, 1))[corners][:, :2]
+            m = np.array(mapping.matrix, np.float32)
+            if not mapping.is_plain():
+                base = base @ m[:, :2].T + m[:, 2]
+            if len(wanted) == 1 or slot_of_triangle is None:
+                return np.ascontiguousarray(base, np.float32)
+            at = tri_corners[np.isin(slot_of_triangle, slots)].reshape(-1)
+            out[at] = base[at]
+        return out
+
+
+class MeshCache:
+    """Converted meshes between two updates of a viewport, so that moving one object does not read all again."""
+
+    def __init__(self):
+        self.meshes = {}  # key -> Mesh without instances
+
+    def forget(self, names):
+        self.meshes = {key: mesh for key, mesh in self.meshes.items() if not names & key[2]}
+
+
+class Collector:
+    def __init__(self, depsgraph, report=None, check=lambda: None, cache=None, images=None, max_shininess=1000.0):
+        """`check` is called between meshes and instances and raises to stop."""
+        self.depsgraph, self.check, self.cache = depsgraph, check, cache
+        self.report = report if report is not None else Report()
+        self.materials = Materials(self.report, max_shininess, images)
+        self.scene = SceneData()
+        self._meshes = {}
+        self.instances = 0
+
+    def collect(self):
+        override = self.depsgraph.view_layer_eval.material_override
+        for count, instance in enumerate(self.depsgraph.object_instances):
+            if count % 64 == 0:
+                self.check()
+            if not instance.show_self:
+                self._check_particles(instance)
+                continue
+            ob = instance.object
+            if ob.type == "MESH":
+                self._check_particles(instance)
+                self._add_mesh(instance, ob, override)
+            elif ob.type == "LIGHT":
+                light = lights.convert_light(ob.name, ob.data, instance.matrix_world, self.materials.images, self.report)
+                if light is not None:
+                    self.scene.lights.append((ob.name, light))
+                if ob.visible_camera:
+                    self.report.note(ob.name, "Lamps that the camera should see, which it does not")
+            elif ob.type in LEFT_OUT:
+                self.report.note(ob.name, LEFT_OUT[ob.type])
+        self.check()
+        self.scene.meshes = [mesh for mesh in self._meshes.values() if mesh is not None and mesh.transforms]
+        scene = self.depsgraph.scene_eval
+        self.scene.environment = lights.convert_world(scene.world, self.materials, self.report)
+        if self.scene.environment is not None and scene.render.film_transparent:
+            self.scene.environment.flags |= library.ENVIRONMENT_HIDDEN
+        if scene.render.use_motion_blur:
+            self.report.note(scene.name, "Motion blur left out")
+        if scene.render.use_freestyle:
+            self.report.note(scene.name, "Freestyle lines left out")
+        # Materials at last: the world's image has been numbered by now.
+        self.scene.materials = self.materials.items() or [("default", library.Material())]
+        self.scene.images = self.materials.image_items()
+        return self.scene
+
+    def _check_particles(self, instance):
+        if instance.is_instance:
+            return
+        ob = instance.object
+        for system in ob.particle_systems:
+            settings = system.settings
+            if settings.type == "HAIR" and settings.render_type == "PATH":
+                self.report.note(f"{ob.name}: {system.name}", "Hair left out")
+            elif settings.render_type in {"HALO", "LINE"}:
+                self.report.note(f"{ob.name}: {system.name}", "Particles without an object left out")
+
+    def _add_mesh(self, instance, ob, override):
+        mesh = ob.data
+        if override is not None:
+            slots = [override]
+        else:
+            slots = [slot.material for slot in ob.material_slots] or [None]
+        numbers = [self.materials.number(material) for material in slots]
+        key = (mesh.as_pointer(), tuple(numbers))
+        if key not in self._meshes:
+            self.check()
+            self._meshes[key] = self._read(ob, mesh, slots, numbers)
+            for flag, text in (("is_holdout", "Holdouts taken as ordinary objects"),
+                               ("is_shadow_catcher", "Shadow catchers taken as ordinary objects")):
+                if getattr(ob, flag, False):
+                    self.report.note(ob.name, text)
+            if not ob.visible_camera or not ob.visible_shadow or not ob.visible_diffuse:
+                self.report.note(ob.name, "Objects hidden from some rays, which all see here")
+        target = self._meshes[key]
+        if target is not None:
+            transform = rows(instance.matrix_world)
+            if is_flat(transform):
+                self.report.note(ob.name, "Objects scaled to nothing left out")
+                return
+            target.transforms.append(transform)
+            self.instances += 1
+
+    def _read(self, ob, mesh, slots, numbers):
+        if self.cache is None:
+            return MeshReader(ob.name, mesh, numbers, self.materials, self.report).read()
+        # Evaluated data move in memory; the originals' names say what they came from.
+        mappings = tuple(self.materials.converted[n].mapping if self.materials.converted[n].pictures else None for n in numbers)
+        names = frozenset({ob.name_full, mesh.name_full})
+        key = (mesh.as_pointer(), mappings, names, tuple(numbers), len(mesh.vertices), len(mesh.loops))
+        found = self.cache.meshes.get(key)
+        if found is None:
+            found = MeshReader(ob.name, mesh, numbers, self.materials, self.report).read()
+            if found is None:
+                return None
+            self.cache.meshes[key] = found
+        return Mesh(found.name, found.positions, found.indices, found.normals, found.uvs, found.materials, found.material, [])
+
+
+def fit(render, camera_data):
+    """(horizontal, sensor width along the fitted side, aspect-corrected width and height)."""
+    width = render.resolution_x * render.pixel_aspect_x
+    height = render.resolution_y * render.pixel_aspect_y
+    mode = camera_data.sensor_fit
+    horizontal = mode == "HORIZONTAL" or (mode == "AUTO" and width >= height)
+    return horizontal, camera_data.sensor_height if mode == "VERTICAL" else camera_data.sensor_width, width, height
+
+
+def convert_camera(camera, scene, report):
+    """A library.Camera of a camera object, as the scene's resolution and pixel aspect frame it."""
+    data = camera.data
+    horizontal, sensor, width, height = fit(scene.render, data)
+    out = library.Camera()
+    m = camera.matrix_world.normalized()
+    out.to_world[:] = rows(m)
+    # What is given along the fitted side, in image heights.
+    heights = width / height if horizontal else 1.0
+    out.pixel_aspect = scene.render.pixel_aspect_x / scene.render.pixel_aspect_y
+    out.shift[:] = [data.shift_x * heights, data.shift_y * heights]
+    out.near_clip, out.far_clip = data.clip_start, data.clip_end
+    if data.type == "ORTHO":
+        out.orthographic = 1
+        out.height = data.ortho_scale / heights
+    else:
+        if data.type == "PANO":
+            report.note(camera.name, "Panoramic cameras taken as perspective ones")
+        out.fov_y = 2 * math.atan(sensor / (2 * data.lens) / heights)
+    if data.dof.use_dof:
+        distance = data.dof.focus_distance
+        if data.dof.focus_object is not None:
+            offset = data.dof.focus_object.matrix_world.translation - m.translation
+            distance = abs(offset @ m.col[2].to_3d())
+        stop = max(data.dof.aperture_fstop, 1e-5)
+        if distance > 0:
+            out.lens_radius = (1.0 if data.type == "ORTHO" else data.lens * 1e-3) / (2 * stop)
+            out.focus_distance = distance
+        if data.dof.aperture_blades > 2 or abs(data.dof.aperture_ratio - 1) > 1e-3:
+            report.note(camera.name, "Shapes of the aperture taken as a disk")
+    return out
+
+
+def viewport_camera(context, width, height):
+    """A library.Camera of a 3D view of width x height pixels."""
+    region, space = context.region_data, context.space_data
+    out = library.Camera(pixel_aspect=1.0)
+    out.to_world[:] = rows(region.view_matrix.inverted_safe().normalized())
+    projection = region.window_matrix  # the view's own: lens, zoom, offset of camera views, all in one
+    out.orthographic = 0 if region.is_perspective else 1
+    half_width, half_height = 1 / projection[0][0], 1 / projection[1][1]
+    if region.is_perspective:
+        out.fov_y = 2 * math.atan(half_height)
+        out.shift[:] = [projection[0][2] * half_width / (2 * half_height), projection[1][2] / 2]
+        out.near_clip, out.far_clip = space.clip_start, space.clip_end
+    else:
+        out.height = 2 * half_height
+        out.shift[:] = [-projection[0][3] * half_width / (2 * half_height), -projection[1][3] / 2]
+        # Orthographic views look from within: begin far behind.
+        back = np.array(region.view_matrix.inverted_safe())[:3, 2]
+        for k in range(3):
+            out.to_world[4 * k + 3] += float(back[k]) * space.clip_end * 0.5
+    return out

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The render engine: final frames. The viewport's half is in viewport.py."""
+import threading
+import time
+import traceback
+
+import bpy
+import numpy as np
+
+from . import collect, export, library, properties, runtime, viewport
+from .report import Report
+
+POLL_MS = 40
+FLAT_RECTS = bpy.app.version >= (4, 1, 0)
+NO_DEPTH = 1e10  # as Cycles has it where nothing is hit
+export_requests = []  # folders that the next render writes a scene to, in place of rendering
+
+
+class Stopped(Exception):
+    pass
+
+
+def write_pass(render_pass, pixels):
+    """pixels (h, w, channels), top row first, into a pass that counts rows from the bottom."""
+    pixels = np.ascontiguousarray(pixels[::-1], np.float32)
+    render_pass.rect.foreach_set(pixels.reshape(-1) if FLAT_RECTS else pixels.reshape(-1, pixels.shape[2]))
+
+
+def crop_of(render, width, height):
+    """(x0, y0, x1, y1), rows from the top, of the border; the whole where there is none."""
+    if not render.use_border:
+        return 0, 0, width, height
+    x0, x1 = int(render.border_min_x * width), int(render.border_max_x * width)
+    y0, y1 = int(render.border_min_y * height), int(render.border_max_y * height)
+    x0, y0 = min(max(x0, 0), width - 1), min(max(y0, 0), height - 1)
+    x1, y1 = max(min(x1, width), x0 + 1), max(min(y1, height), y0 + 1)
+    return x0, height - y1, x1, height - y0
+
+
+class Watched:
+    """Runs calls of the library in a thread, so that the host's stop button is looked at while they work."""
+
+    def __init__(self, engine):
+        self.engine = engine
+
+    def run(self, handle, phase, fn):
+        failure = []
+
+        def work():
+            try:
+                fn()
+            except BaseException as error:  # handed over to the caller
+                failure.append(error)
+
+        thread = threading.Thread(target=work, name="lumicut")
+        thread.start()
+        stopped = False
+        while thread.is_alive():
+            thread.join(POLL_MS / 1000)
+            if not stopped and self.engine.test_break():
+                stopped = True
+                handle.cancel()
+            self.engine.update_stats("Lumicut", phase)
+        if failure and not isinstance(failure[0], library.Cancelled):
+            raise failure[0]
+        if stopped or failure:
+            raise Stopped
+
+
+class LumicutEngine(bpy.types.RenderEngine):
+    bl_idname = "LUMICUT"
+    bl_label = "Lumicut"
+    bl_use_preview = True
+    bl_use_eevee_viewport = True
+    bl_use_postprocess = True
+    bl_use_shading_nodes_custom = False
+    bl_use_alembic_procedural = False
+
+    # ---- Final frames -------------------------------------------------------------------------------------------
+
+    def render(self, depsgraph):
+        # An exception that leaves here gives a blank image and exit code 0, and error_set alone saves the image: report.
+        try:
+            self._render(depsgraph)
+        except (Stopped, collect.Cancelled):
+            if bpy.app.background:
+                self.report({"ERROR"}, "Lumicut: cancelled, no image")
+        except (library.Error, library.LibraryMissing, export.ExportError, OSError) as error:
+            self.report({"ERROR"}, f"Lumicut: {error}")
+        except Exception as error:
+            traceback.print_exc()
+            self.report({"ERROR"}, f"Lumicut: a defect of the add-on: {type(error).__name__}: {error}")
+
+    def _check(self):
+        if self.test_break():
+            raise collect.Cancelled
+
+    def _render(self, depsgraph):
+        lib = runtime.require()
+        scene = depsgraph.scene_eval
+        settings = depsgraph.scene.lumicut
+        started = time.perf_counter()
+        self.update_stats("Lumicut", "collecting the scene")
+        report = Report()
+        data = collect.Collector(depsgraph, report, self._check, max_shininess=settings.max_shininess).collect()
+        camera = self.camera_override or scene.camera
+        if camera is None:
+            raise library.Error(library.INVALID_STATE, "the scene has no camera")
+        data.camera = collect.convert_camera(camera, scene, report)
+        collected = time.perf_counter() - started
+        width, height = self.resolution_x, self.resolution_y
+        crop = crop_of(scene.render, width, height)
+        self._tell(report)
+        if export_requests and not self.is_preview:
+            export.write_scene(export_requests[0], data, width, height, settings)
+            self._blank(depsgraph, crop)
+            return
+        if self.is_preview:
+            integrator_name, samples, parameters = self._preview_settings()
+        else:
+            integrator_name, samples = settings.integrator, settings.samples
+            parameters = properties.parameters_of(settings)
+
+        device = runtime.device(settings.threads)
+        watched = Watched(self)
+        with library.Scene(device, settings.accel) as target, library.Integrator(device, integrator_name) as integrator:
+            data.upload(target, self._check)
+            triangles, instances = data.triangles(), sum(len(m.transforms) for m in data.meshes)
+            lamps, meshes = len(data.lights), len(data.meshes)
+            data = None  # the library has its own copy now
+            watched.run(target, "acceleration structure", target.commit)
+            self._check()
+            for name, value in parameters.items():
+                integrator.set(name, value)
+            with library.Render(integrator, target, width, height, samples, crop, self._tile_size(crop)) as render:
+                self._follow(render, depsgraph, crop, height)
+                stats = render.stats()
+        if not self.is_preview:
+            runtime.last.update(stats=stats, collect_seconds=collected, seconds=time.perf_counter() - started,
+                                integrator=integrator_name, notes=report.lines(),
+                                scene={"triangles": triangles, "instances": instances, "meshes": meshes, "lamps": lamps})
+
+    @staticmethod
+    def _preview_settings():
+        names = [row[0] for row in properties.tables.integrators]
+        if "stochastic_lightcuts" in names:
+            return "stochastic_lightcuts", 1, {"vpls": "2000", "lights": "32"}
+        return names[0], 1, {"vpls": "300"}
+
+    @staticmethod
+    def _tile_size(crop):
+        # About a hundred tiles at most sizes: the host spends a millisecond or two on each.
+        side = max(crop[2] - crop[0], crop[3] - crop[1])
+        return 32 if side <= 320 else 64 if side <= 800 else 128
+
+    def _tell(self, report):
+        if self.is_preview:
+            return
+        runtime.last["notes"] = report.lines()
+        for line in report.lines(most_names=12):
+            self.report({"INFO"}, f"Lumicut: {line}")  # printed, where there is no window
+
+    def _follow(self, render, depsgraph, crop, height):
+        """Polls until the frame is done; hands tiles over as they finish."""
+        passes = self._pass_list(depsgraph)
+        show_tiles = not bpy.app.background
+        stopped = None
+        while True:
+            try:
+                status = render.wait(POLL_MS)
+            except library.Cancelled:
+                raise Stopped from None
+            if stopped is None and self.test_break():
+                stopped = time.perf_counter()
+                render.cancel()
+                continue
+            phase = (status.phase or b"").decode()
+            rendering = phase == "render"
+            self.update_stats("Lumicut", f"{phase} {100 * status.fraction:.0f} %" if phase else "")
+            # Preparing has several phases, which count from 0 each: it gets the first fifth together.
+            self.update_progress(0.2 + 0.8 * status.fraction if rendering else 0.2 * status.fraction)
+            if status.state != library.RUNNING:
+                break
+            if show_tiles and stopped is None:
+                deadline = time.perf_counter() + 0.1
+                while time.perf_counter() < deadline and (tile := render.next_tile()) is not None:
+                    self._write(render, depsgraph, passes, crop, tile, height)
+        if self.test_break():
+            raise Stopped
+        self._write(render, depsgraph, passes, crop, crop, height)
+        self.update_progress(1.0)
+
+    def _pass_list(self, depsgraph):
+        """[(pass name, channel)] beside Combined."""
+        layer = depsgraph.view_layer_eval
+        chosen = [(name, channel) for name, channel, wanted in
+                  (("Depth", "depth", layer.use_pass_z), ("Normal", "normal", layer.use_pass_normal),
+                   ("Position", "position", getattr(layer, "use_pass_position", False))) if wanted]
+        for channel, (name, prop, _, _, letters, _) in properties.PASSES.items():
+            if getattr(layer.lumicut, prop):
+                self.add_pass(name, len(letters), letters, layer=layer.name)
+                chosen.append((name, channel))
+        return chosen
+
+    def _write(self, render, depsgraph, passes, crop, tile, height):
+        """A finished rectangle into the render result, which counts from the border's lower left corner."""
+        x0, y0, x1, y1 = tile
+        result = self.begin_result(x0 - crop[0], crop[3] - y1, x1 - x0, y1 - y0, layer=depsgraph.view_layer_eval.name)
+        try:
+            found = result.layers[0].passes
+            radiance, alpha = render.read("radiance", tile), render.read("alpha", tile)
+            combined = np.ones(radiance.shape[:2] + (4,), np.float32)
+            combined[..., :3] = radiance
+            if depsgraph.scene_eval.render.film_transparent:
+                combined[..., 3:] = alpha
+            write_pass(found["Combined"], combined)
+            for name, channel in passes:
+                target = found.get(name)
+                if target is None:
+                    continue
+                pixels = render.read(channel, tile)
+                if channel == "depth":
+                    pixels = np.where(alpha > 0, pixels, np.float32(NO_DEPTH))
+                write_pass(target, pixels)
+        finally:
+            self.end_result(result)
+
+    def _blank(self, depsgraph, crop):
+        result = self.begin_result(0, 0, crop[2] - crop[0], crop[3] - crop[1], layer=depsgraph.view_layer_eval.name)
+        self.end_result(result)
+
+    def update_render_passes(self, scene=None, renderlayer=None):
+        self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
+        for name, wanted, letters, kind in (
+                ("Depth", renderlayer.use_pass_z, "Z", "VALUE"),
+                ("Normal", renderlayer.use_pass_normal, "XYZ", "VECTOR"),
+                ("Position", getattr(renderlayer, "use_pass_position", False), "XYZ", "VECTOR")):
+            if wanted:
+                self.register_pass(scene, renderlayer, name, len(letters), letters, kind)
+        for name, prop, _, _, letters, kind in properties.PASSES.values():
+            if getattr(renderlayer.lumicut, prop):
+                self.register_pass(scene, renderlayer, name, len(letters), letters, kind)
+
+    # ---- Viewport -----------------------------------------------------------------------------------------------
+
+    def view_update(self, context, depsgraph):
+        viewport.of(self).update(self, context, depsgraph)
+
+    def view_draw(self, context, depsgraph):
+        viewport.of(self).draw(self, context, depsgraph)
+
+    def __del__(self):
+        viewport.forget(self)
+
+
+def register():
+    bpy.utils.register_class(LumicutEngine)
+
+
+def unregister():
+    viewport.stop_all()
+    bpy.utils.unregister_class(LumicutEngine)

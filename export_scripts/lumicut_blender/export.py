@@ -1,0 +1,268 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A collected scene as files that `lumicut render` reads: scene.json, an OBJ a mesh, images as PNG and EXR.
+
+Numbers are written so that they read back the same, bit for bit: the command renders what F12 renders.
+"""
+import json
+import math
+import os
+import pathlib
+import re
+import shutil
+import struct
+import tempfile
+import zlib
+
+import numpy as np
+
+from . import library, properties
+
+
+class ExportError(RuntimeError):
+    pass
+
+
+def png(pixels):
+    """Bytes of an 8-bit PNG: (h, w, 1 or 3), top row first."""
+    height, width, channels = pixels.shape
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    rows = np.zeros((height, 1 + width * channels), np.uint8)  # each begins with its filter, 0: none
+    rows[:, 1:] = pixels.reshape(height, -1)
+    header = struct.pack(">IIBBBBB", width, height, 8, {1: 0, 3: 2}[channels], 0, 0, 0)
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows.tobytes(), 6)) +
+            chunk(b"IEND", b""))
+
+
+def exr(pixels):
+    """Bytes of an uncompressed 32-bit OpenEXR: (h, w, 1 or 3), top row first."""
+    height, width, channels = pixels.shape
+    names = ["Y"] if channels == 1 else ["B", "G", "R"]  # in the file's order, by name
+
+    def attribute(name, kind, data):
+        return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<I", len(data)) + data
+
+    channel_list = b"".join(n.encode() + b"\0" + struct.pack("<iIii", 2, 0, 1, 1) for n in names) + b"\0"
+    window = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    header = (struct.pack("<II", 20000630, 2) + attribute("channels", "chlist", channel_list) +
+              attribute("compression", "compression", b"\0") + attribute("dataWindow", "box2i", window) +
+              attribute("displayWindow", "box2i", window) + attribute("lineOrder", "lineOrder", b"\0") +
+              attribute("pixelAspectRatio", "float", struct.pack("<f", 1)) +
+              attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0)) +
+              attribute("screenWindowWidth", "float", struct.pack("<f", 1)) + b"\0")
+    line = 8 + 4 * channels * width
+    first = len(header) + 8 * height
+    offsets = first + line * np.arange(height, dtype="<u8")
+    body = np.zeros((height, 2 + channels * width), "<f4")
+    body[:, 2:] = pixels[..., ::-1].transpose(0, 2, 1).reshape(height, -1)
+    raw = body.view("<i4")
+    raw[:, 0], raw[:, 1] = np.arange(height), 4 * channels * width
+    return header + offsets.tobytes() + body.tobytes()
+
+
+def linear(image):
+    """An image's texels as linear float32."""
+    from .nodes import srgb_to_linear
+    if image.pixels.dtype != np.uint8:
+        return image.pixels
+    table = np.arange(256, dtype=np.float32) / 255
+    return (srgb_to_linear(table) if image.flags & library.SRGB else table)[image.pixels]
+
+
+def plain_name(name, used, ending):
+    """A file name of letters, digits, - and _ that is not in `used` yet."""
+    stem = re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_")[:60] or "unnamed"
+    candidate, number = stem, 1
+    while (candidate + ending).lower() in used:
+        number += 1
+        candidate = f"{stem}_{number}"
+    used.add((candidate + ending).lower())
+    return candidate + ending
+
+
+def numbers(values):
+    """JSON numbers that read back as the same single-precision values."""
+    return [float(f"{float(v):.9g}") for v in values]
+
+
+def degrees(radians):
+    return math.degrees(radians)
+
+
+def obj(mesh, mtl, material_names):
+    """Text of an OBJ: as many vertices, normals and texture coordinates as the mesh has, in its order."""
+    def lines(key, array):
+        if array is None:
+            return ""
+        form = key + " " + " ".join(["%.9g"] * array.shape[1]) + "\n"
+        return (form * len(array)) % tuple(array.astype(np.float64).reshape(-1))
+
+    parts = [f"mtllib {mtl}\n", lines("v", mesh.positions), lines("vt", mesh.uvs), lines("vn", mesh.normals)]
+    corner = "%d" if mesh.uvs is None and mesh.normals is None else "%d/%d" if mesh.normals is None else \
+        "%d//%d" if mesh.uvs is None else "%d/%d/%d"
+    form = "f " + " ".join([corner] * 3) + "\n"
+
+    def faces(indices):
+        return (form * len(indices)) % tuple(np.repeat(indices.reshape(-1).astype(np.int64) + 1, corner.count("%d")))
+
+    if mesh.materials is None:
+        parts += [f"usemtl {material_names[mesh.material]}\n", faces(mesh.indices)]
+    else:  # runs of faces, in their order
+        starts = np.concatenate([[0], np.nonzero(np.diff(mesh.materials))[0] + 1, [len(mesh.materials)]])
+        for a, b in zip(starts[:-1], starts[1:]):
+            parts += [f"usemtl {material_names[mesh.materials[a]]}\n", faces(mesh.indices[a:b])]
+    return "".join(parts)
+
+
+class Writer:
+    def __init__(self, folder, data, stem):
+        self.folder, self.data, self.stem = folder, data, stem
+        self.files, self.used = {}, set()
+
+    def write(self, name, content):
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return name
+
+    def image(self, number, use):
+        """File of the 1-based image for "colour" (PNGs are sRGB), "mask" or "radiance" (EXR)."""
+        image = self.data.images[number - 1]
+        byte = image.pixels.dtype == np.uint8
+        as_png = byte and (use == "mask" or (use == "colour" and image.flags & library.SRGB))
+        key = number, as_png
+        if key not in self.files:
+            name = "textures/" + plain_name(os.path.splitext(image.name)[0], self.used, ".png" if as_png else ".exr")
+            pixels = image.pixels if as_png else np.maximum(linear(image), 0)
+            self.files[key] = self.write(name, png(pixels) if as_png else exr(pixels))
+        return self.files[key]
+
+    def texture(self, number, use):
+        name, flags = self.image(number, use), self.data.images[number - 1].flags
+        options = {key: True for key, bit in (("clamp", library.CLAMP), ("nearest", library.NEAREST)) if flags & bit}
+        return {"file": name, **options} if options else name
+
+    def material(self, name, m):
+        out = {"name": name, "diffuse": numbers(m.diffuse), "specular": numbers(m.specular),
+               "shininess": numbers([m.shininess])[0]}
+        if m.flags & library.PHONG:
+            out["model"] = "phong"
+        if m.opacity not in (0.0, 1.0):
+            out["opacity"] = numbers([m.opacity])[0]
+        if any(m.emission):
+            out["emission"] = numbers(m.emission)
+            out["emit_both_sides"] = bool(m.flags & library.EMIT_BOTH_SIDES)
+        for slot, use in (("diffuse", "colour"), ("specular", "colour"), ("emission", "colour"), ("opacity", "mask")):
+            number = getattr(m, slot + "_texture")
+            if number:
+                out[slot + "_texture"] = self.texture(number, use)
+        return out
+
+    @staticmethod
+    def light(light):
+        kind = ("point", "spot", "rectangle", "disk", "sun")[light.type]
+        out = {"type": kind, "unit": "watt", "value": numbers([light.value])[0], "color": numbers(light.color)}
+        if kind != "sun":
+            out["position"] = numbers(light.position)
+        if kind in ("point", "spot"):
+            out["radius"] = numbers([light.radius])[0]
+        if kind in ("spot", "sun"):
+            out["direction"] = numbers(light.direction)
+        if kind == "spot":
+            out |= {"angle": degrees(light.angle), "blend": numbers([light.blend])[0], "cosine": bool(light.spot_cosine)}
+        if kind == "sun":
+            out["angular_radius"] = degrees(light.radius)
+        if kind in ("rectangle", "disk"):
+            out |= {"u": numbers(light.u), "v": numbers(light.v), "spread": degrees(light.spread or math.pi)}
+        return out
+
+    @staticmethod
+    def camera(c):
+        out = {"type": "orthographic" if c.orthographic else "perspective", "matrix": numbers(c.to_world),
+               "shift": numbers(c.shift), "near": numbers([c.near_clip])[0], "far": numbers([c.far_clip])[0],
+               "pixel_aspect": numbers([c.pixel_aspect])[0]}
+        out |= {"height": numbers([c.height])[0]} if c.orthographic else {"fov_y": degrees(c.fov_y)}
+        if c.lens_radius > 0:
+            out |= {"lens_radius": numbers([c.lens_radius])[0], "focus_distance": numbers([c.focus_distance])[0]}
+        return out
+
+    def environment(self, e):
+        out = {"color": numbers(e.color)}
+        if e.texture:
+            out |= {"image": self.image(e.texture, "radiance"), "world_to_map": numbers(e.world_to_map)}
+        if e.flags & library.ENVIRONMENT_HIDDEN:
+            out["hidden"] = True
+        return out
+
+    def scene(self, width, height, settings):
+        names, taken = [], set()
+        for name, _ in self.data.materials:
+            names.append(plain_name(name, taken, ""))
+        mtl = f"{self.stem}.mtl"
+        self.write(f"meshes/{mtl}", "".join(f"newmtl {n}\n" for n in names))
+        out = {"description": "Exported from Blender by the Lumicut add-on", "up": "z",
+               "image": {"size": [width, height], "samples": settings.samples},
+               "camera": self.camera(self.data.camera),
+               "materials": [self.material(n, m) for n, (_, m) in zip(names, self.data.materials)],
+               "lights": [self.light(light) for _, light in self.data.lights], "meshes": []}
+        if self.data.environment is not None:
+            out["environment"] = self.environment(self.data.environment)
+        for mesh in self.data.meshes:
+            if not mesh.transforms:
+                continue
+            file = "meshes/" + plain_name(mesh.name, self.used, ".obj")
+            self.write(file, obj(mesh, mtl, names))
+            out["meshes"].append({"name": mesh.name, "obj": file, "materials": {n: n for n in names},
+                                  "instances": [numbers(t) for t in mesh.transforms]})
+        if not out["meshes"]:
+            raise ExportError("the scene has no mesh to export")
+        return out
+
+
+def command_of(path, settings):
+    """The command that renders the exported scene as F12 does."""
+    words = ["lumicut", "render", str(path), "-i", settings.integrator, "--accel", settings.accel]
+    for name, value in properties.parameters_of(settings).items():
+        words += ["-p", f"{name}={value}"]
+    return words + ["-o", str(path.with_suffix(".exr"))]
+
+
+def write_scene(path, data, width, height, settings):
+    """Writes PATH.json, PATH/meshes and PATH/textures beside their place first, then moves them there as a whole."""
+    path = pathlib.Path(path)
+    if path.suffix.lower() != ".json":
+        path = path.with_suffix(".json")
+    if not path.parent.is_dir():
+        raise ExportError(f"{path.parent} is no folder")
+    beside = pathlib.Path(tempfile.mkdtemp(prefix=f".{path.stem}.", dir=path.parent))
+    try:
+        writer = Writer(beside, data, path.stem)
+        scene = writer.scene(width, height, settings)
+        files = f"{path.stem}_files"
+
+        def moved(name):
+            return f"{files}/{name}"
+
+        for mesh in scene["meshes"]:
+            mesh["obj"] = moved(mesh["obj"])
+        for material in scene["materials"]:
+            for key in [k for k in material if k.endswith("_texture")]:
+                t = material[key]
+                material[key] = moved(t) if isinstance(t, str) else {**t, "file": moved(t["file"])}
+        if "image" in scene.get("environment", {}):
+            scene["environment"]["image"] = moved(scene["environment"]["image"])
+        scene["description"] += ". As F12 renders it: " + " ".join(command_of(pathlib.Path(path.name), settings)[:8])
+        fresh = path.parent / f".{path.name}.new"
+        fresh.write_text(json.dumps(scene, indent=1) + "\n")
+        target = path.parent / files
+        if target.exists():
+            shutil.rmtree(target)
+        os.chmod(beside, 0o755)
+        beside.rename(target)
+        fresh.replace(path)
+    except BaseException:
+        shutil.rmtree(beside, ignore_errors=True)
+        raise
+    return path

@@ -1,0 +1,411 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The library from Python: every ctypes declaration of the add-on, and handles that release themselves.
+
+Mirrors plugin/include/lumicut/lumicut.h, ABI 1. Knows nothing of Blender, so that it runs in any Python with numpy.
+All functions have their signatures (a missing one truncates pointers); ctypes releases the GIL while a call works.
+"""
+import ctypes
+import ctypes.util
+import json
+import os
+import pathlib
+import sys
+from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int32, c_uint32, c_uint64, c_void_p
+
+import numpy as np
+
+ABI_MAJOR, ABI_MINOR = 1, 0
+OK, INVALID_ARGUMENT, INVALID_STATE, UNSUPPORTED, OUT_OF_MEMORY, CANCELLED, INTERNAL = range(7)
+IDLE, RUNNING, DONE, STOPPED, FAILED = range(5)
+FLOAT, INT, BOOL, CHOICE = range(4)
+UINT8, FLOAT32 = 0, 1
+SRGB, CLAMP, NEAREST = 1, 2, 4
+EMIT_BOTH_SIDES, PHONG = 1, 2
+POINT, SPOT, RECTANGLE, DISK, SUN = range(5)
+RADIOMETRIC, WATT = 0, 1
+ENVIRONMENT_HIDDEN = 1
+FOREVER = 0xFFFFFFFF
+
+
+class Error(RuntimeError):
+    """A call failed; the text is the library's own and names field and value."""
+
+    def __init__(self, code, text):
+        super().__init__(text)
+        self.code = code
+
+
+class Cancelled(Error):
+    pass
+
+
+class LibraryMissing(RuntimeError):
+    """No usable library; the text says what was tried, and why each was refused."""
+
+
+class Descriptor(Structure):
+    """Fills struct_size, the growth rule's first field."""
+
+    def __init__(self, **fields):
+        super().__init__(**fields)
+        self.struct_size = ctypes.sizeof(self)
+
+
+LOG_FUNCTION = ctypes.CFUNCTYPE(None, c_void_p, c_int32, c_char_p)
+
+
+class DeviceDesc(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("abi_major", c_uint32), ("threads", c_int32), ("verbosity", c_int32),
+                ("log", LOG_FUNCTION), ("user", c_void_p)]
+
+
+class Status(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("state", c_int32), ("phase", c_char_p), ("fraction", c_double),
+                ("seconds", c_double), ("tiles_done", c_uint64), ("tiles_total", c_uint64)]
+
+
+class SceneDesc(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("robust", c_uint32), ("accel", c_char_p)]
+
+
+class Texture(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("width", c_uint32), ("height", c_uint32), ("channels", c_uint32),
+                ("format", c_uint32), ("flags", c_uint32), ("pixels", c_void_p)]
+
+
+class Material(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("flags", c_uint32), ("diffuse", c_float * 3), ("shininess", c_float),
+                ("specular", c_float * 3), ("opacity", c_float), ("emission", c_float * 3),
+                ("diffuse_texture", c_int32), ("specular_texture", c_int32), ("opacity_texture", c_int32),
+                ("emission_texture", c_int32)]
+
+
+class Mesh(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("mask", c_uint32), ("positions", c_void_p), ("normals", c_void_p),
+                ("uvs", c_void_p), ("vertex_count", c_uint64), ("indices", c_void_p), ("triangle_count", c_uint64),
+                ("materials", c_void_p), ("transforms", c_void_p), ("transform_count", c_uint64),
+                ("material", c_uint32), ("group", c_uint32)]
+
+
+class Light(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("type", c_uint32), ("unit", c_uint32), ("group", c_uint32),
+                ("color", c_float * 3), ("value", c_float), ("position", c_float * 3), ("radius", c_float),
+                ("direction", c_float * 3), ("angle", c_float), ("u", c_float * 3), ("blend", c_float),
+                ("v", c_float * 3), ("spread", c_float), ("spot_cosine", c_uint32)]
+
+
+class Environment(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("group", c_uint32), ("color", c_float * 3), ("texture", c_int32),
+                ("world_to_map", c_float * 9), ("flags", c_uint32)]
+
+
+class Camera(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("orthographic", c_uint32), ("to_world", c_float * 12),
+                ("fov_y", c_float), ("height", c_float), ("shift", c_float * 2), ("near_clip", c_float),
+                ("far_clip", c_float), ("pixel_aspect", c_float), ("lens_radius", c_float),
+                ("focus_distance", c_float)]
+
+
+class IntegratorInfo(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("param_count", c_uint32), ("id", c_char_p), ("label", c_char_p),
+                ("description", c_char_p), ("source", c_char_p)]
+
+
+class ParamInfo(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("type", c_uint32), ("id", c_char_p), ("label", c_char_p),
+                ("description", c_char_p), ("unit", c_char_p), ("choices", c_char_p), ("default_text", c_char_p),
+                ("minimum", c_double), ("maximum", c_double)]
+
+
+class RenderDesc(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("width", c_uint32), ("height", c_uint32), ("samples", c_uint32),
+                ("crop", c_uint32 * 4), ("tile_size", c_uint32)]
+
+
+class Tile(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("x0", c_uint32), ("y0", c_uint32), ("x1", c_uint32), ("y1", c_uint32)]
+
+
+class ChannelInfo(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("components", c_uint32), ("name", c_char_p), ("description", c_char_p)]
+
+
+# Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
+SIZES = {DeviceDesc: 32, Status: 48, SceneDesc: 16, Texture: 32, Material: 68, Mesh: 88, Light: 100, Environment: 64,
+         Camera: 92, IntegratorInfo: 40, ParamInfo: 72, RenderDesc: 36, Tile: 20, ChannelInfo: 24}
+
+RESULT = c_int32
+HANDLE = c_void_p
+FUNCTIONS = {
+    "version": (c_char_p, [POINTER(c_uint32), POINTER(c_uint32)]),
+    "last_error": (c_char_p, []),
+    "device_create": (RESULT, [POINTER(DeviceDesc), POINTER(HANDLE)]),
+    "release": (None, [HANDLE]),
+    "get_status": (RESULT, [HANDLE, POINTER(Status)]),
+    "cancel": (RESULT, [HANDLE]),
+    "stats_json": (c_char_p, [HANDLE]),
+    "scene_create": (RESULT, [HANDLE, POINTER(SceneDesc), POINTER(HANDLE)]),
+    "scene_set_textures": (RESULT, [HANDLE, POINTER(Texture), c_uint64]),
+    "scene_set_materials": (RESULT, [HANDLE, POINTER(Material), c_uint64]),
+    "scene_add_mesh": (RESULT, [HANDLE, POINTER(Mesh), POINTER(c_uint32)]),
+    "scene_set_lights": (RESULT, [HANDLE, POINTER(Light), c_uint64]),
+    "scene_set_environment": (RESULT, [HANDLE, POINTER(Environment)]),
+    "scene_set_camera": (RESULT, [HANDLE, POINTER(Camera)]),
+    "scene_commit": (RESULT, [HANDLE]),
+    "get_integrator_info": (RESULT, [c_uint32, POINTER(IntegratorInfo)]),
+    "get_param_info": (RESULT, [c_char_p, c_uint32, POINTER(ParamInfo)]),
+    "integrator_create": (RESULT, [HANDLE, c_char_p, POINTER(HANDLE)]),
+    "integrator_set": (RESULT, [HANDLE, c_char_p, c_char_p]),
+    "integrator_prepare": (RESULT, [HANDLE, HANDLE]),
+    "get_channel_info": (RESULT, [c_uint32, POINTER(ChannelInfo)]),
+    "render_start": (RESULT, [HANDLE, HANDLE, POINTER(RenderDesc), POINTER(HANDLE)]),
+    "render_wait": (RESULT, [HANDLE, c_uint32, POINTER(Status)]),
+    "render_next_tile": (RESULT, [HANDLE, POINTER(Tile)]),
+    "render_read": (RESULT, [HANDLE, c_char_p, POINTER(Tile), c_void_p]),
+}
+
+
+def library_name():
+    if sys.platform == "darwin":
+        return "liblumicut.dylib"
+    return "lumicut.dll" if os.name == "nt" else "liblumicut.so.1"
+
+
+def candidates(preference=""):
+    """(origin, path) to try in order: the one in the add-on's folder, the preference's, the system's."""
+    found = []
+    bundled = pathlib.Path(__file__).resolve().parent / "lib" / library_name()
+    if bundled.exists():
+        found.append(("bundled with the add-on", str(bundled)))
+    if preference:
+        path = pathlib.Path(preference)
+        found.append(("preference", str(path / library_name() if path.is_dir() else path)))
+    if os.environ.get("LUMICUT_LIBRARY"):
+        found.append(("environment variable LUMICUT_LIBRARY", os.environ["LUMICUT_LIBRARY"]))
+    found.append(("system", library_name()))
+    return found
+
+
+def load_file(path):
+    """The library in a file, all signatures declared. OSError, or LibraryMissing with what does not fit."""
+    dll = ctypes.CDLL(path)
+    missing = [name for name in FUNCTIONS if not hasattr(dll, "lumicut_" + name)]
+    if missing:
+        raise LibraryMissing("lacks the functions " + ", ".join("lumicut_" + name for name in missing))
+    for name, (result, arguments) in FUNCTIONS.items():
+        function = getattr(dll, "lumicut_" + name)
+        function.restype, function.argtypes = result, arguments
+    major, minor = c_uint32(), c_uint32()
+    version = dll.lumicut_version(ctypes.byref(major), ctypes.byref(minor)).decode()
+    if major.value != ABI_MAJOR:
+        raise LibraryMissing(f"Lumicut {version} speaks ABI {major.value}.{minor.value}, "
+                             f"this add-on ABI {ABI_MAJOR}: install the add-on and the library of one release")
+    wrong = [f"{cls.__name__} has {ctypes.sizeof(cls)} bytes instead of {size}"
+             for cls, size in SIZES.items() if ctypes.sizeof(cls) != size]
+    if wrong:
+        raise LibraryMissing("this Python lays structures out differently: " + "; ".join(wrong))
+    return dll, version, (major.value, minor.value)
+
+
+class Library:
+    """The loaded library and its tables. Raises Error where a call fails, Cancelled where it was cancelled."""
+
+    def __init__(self, preference=""):
+        tried = []
+        for origin, path in candidates(preference):
+            try:
+                self.dll, self.version, self.abi = load_file(path)
+            except (OSError, LibraryMissing) as reason:
+                tried.append(f"{origin}: {path}: {reason}")
+                continue
+            self.origin, self.path = origin, path
+            return
+        raise LibraryMissing("no usable Lumicut library. Tried " + " | ".join(tried) +
+                             ". Install the zip that holds it, or name its file in the add-on's preferences")
+
+    def check(self, code):
+        if code == OK:
+            return
+        text = (self.dll.lumicut_last_error() or b"").decode(errors="replace")
+        raise (Cancelled if code == CANCELLED else Error)(code, text or f"error {code}")
+
+    def integrators(self):
+        """[(id, label, description, source, [parameters])], as the library declares them; all texts str."""
+        result = []
+        while True:
+            info = IntegratorInfo()
+            if self.dll.lumicut_get_integrator_info(len(result), ctypes.byref(info)) != OK:
+                return result
+            parameters = []
+            for i in range(info.param_count):
+                p = ParamInfo()
+                self.check(self.dll.lumicut_get_param_info(info.id, i, ctypes.byref(p)))
+                parameters.append({name: getattr(p, name).decode() for name in
+                                   ("id", "label", "description", "unit", "choices", "default_text")} |
+                                  {"type": p.type, "minimum": p.minimum, "maximum": p.maximum})
+            result.append((info.id.decode(), info.label.decode(), info.description.decode(), info.source.decode(),
+                           parameters))
+
+    def channels(self):
+        """{name: components}"""
+        result = {}
+        while True:
+            info = ChannelInfo()
+            if self.dll.lumicut_get_channel_info(len(result), ctypes.byref(info)) != OK:
+                return result
+            result[info.name.decode()] = info.components
+
+
+class Handle:
+    """One reference to an object of the library; released when it is closed or collected."""
+
+    def __init__(self, library):
+        self.library, self.pointer = library, c_void_p()
+
+    def _create(self, name, *arguments):
+        self.library.check(getattr(self.library.dll, "lumicut_" + name)(*arguments, ctypes.byref(self.pointer)))
+
+    def _call(self, name, *arguments):
+        self.library.check(getattr(self.library.dll, "lumicut_" + name)(self.pointer, *arguments))
+
+    def cancel(self):
+        if self.pointer:
+            self.library.dll.lumicut_cancel(self.pointer)
+
+    def status(self):
+        status = Status()
+        self._call("get_status", ctypes.byref(status))
+        return status
+
+    def stats(self):
+        text = self.library.dll.lumicut_stats_json(self.pointer)
+        return json.loads(text) if text else {}
+
+    def close(self):
+        if self.pointer:
+            self.library.dll.lumicut_release(self.pointer)
+            self.pointer = c_void_p()
+
+    def __del__(self):
+        self.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+
+class Device(Handle):
+    def __init__(self, library, threads=0, log=None, verbosity=1):
+        """log(level, text) is called from any thread."""
+        super().__init__(library)
+        self._log = LOG_FUNCTION((lambda _, level, text: log(level, text.decode(errors="replace"))) if log else 0)
+        self._create("device_create", ctypes.byref(
+            DeviceDesc(abi_major=ABI_MAJOR, threads=threads, verbosity=verbosity, log=self._log)))
+
+
+def _array(cls, items):
+    return (cls * len(items))(*items), len(items)
+
+
+def _rows(a, dtype, width):
+    """The array as the library wants it: packed, of this type, `width` columns. None stays None."""
+    if a is None:
+        return None
+    a = np.ascontiguousarray(a, dtype)
+    return a.reshape(-1, width) if width > 1 else a.reshape(-1)
+
+
+class Scene(Handle):
+    def __init__(self, device, accel="agglomerative"):
+        super().__init__(device.library)
+        self.device = device
+        self._create("scene_create", device.pointer, ctypes.byref(SceneDesc(accel=accel.encode())))
+
+    def set_textures(self, textures):
+        """(pixels, flags) each: pixels (h, w, channels) of uint8 or float32, top row first."""
+        items = []
+        for pixels, flags in textures:
+            height, width, channels = pixels.shape
+            assert pixels.flags.c_contiguous and pixels.dtype in (np.uint8, np.float32)
+            items.append(Texture(width=width, height=height, channels=channels, flags=flags, pixels=pixels.ctypes.data,
+                                 format=UINT8 if pixels.dtype == np.uint8 else FLOAT32))
+        self._call("scene_set_textures", *_array(Texture, items))
+
+    def set_materials(self, materials):
+        self._call("scene_set_materials", *_array(Material, materials))
+
+    def set_lights(self, lights):
+        self._call("scene_set_lights", *_array(Light, lights))
+
+    def add_mesh(self, positions, indices, normals=None, uvs=None, materials=None, material=0, transforms=None):
+        positions, normals, uvs = _rows(positions, np.float32, 3), _rows(normals, np.float32, 3), _rows(uvs, np.float32, 2)
+        indices, materials = _rows(indices, np.uint32, 3), _rows(materials, np.uint32, 1)
+        transforms = _rows(transforms, np.float32, 12)
+        for name, a in (("normals", normals), ("uvs", uvs)):
+            if a is not None and len(a) != len(positions):
+                raise Error(INVALID_ARGUMENT, f"{name}: {len(a)} for {len(positions)} vertices")
+        if materials is not None and len(materials) != len(indices):
+            raise Error(INVALID_ARGUMENT, f"materials: {len(materials)} for {len(indices)} triangles")
+
+        def address(a):
+            return None if a is None else a.ctypes.data
+
+        mesh = Mesh(positions=address(positions), normals=address(normals), uvs=address(uvs),
+                    vertex_count=len(positions), indices=address(indices), triangle_count=len(indices),
+                    materials=address(materials), material=material, transforms=address(transforms),
+                    transform_count=0 if transforms is None else len(transforms))
+        self._call("scene_add_mesh", ctypes.byref(mesh), ctypes.byref(c_uint32()))
+
+    def set_environment(self, environment):
+        self._call("scene_set_environment", None if environment is None else ctypes.byref(environment))
+
+    def set_camera(self, camera):
+        self._call("scene_set_camera", ctypes.byref(camera))
+
+    def commit(self):
+        self._call("scene_commit")
+
+
+class Integrator(Handle):
+    def __init__(self, device, name):
+        super().__init__(device.library)
+        self._create("integrator_create", device.pointer, name.encode())
+
+    def set(self, name, value):
+        self._call("integrator_set", name.encode(), str(value).encode())
+
+    def prepare(self, scene):
+        self._call("integrator_prepare", scene.pointer)
+
+
+class Render(Handle):
+    """A frame that renders in the background. Tiles and crop count rows from the top."""
+
+    def __init__(self, integrator, scene, width, height, samples=1, crop=None, tile_size=0):
+        super().__init__(integrator.library)
+        self.crop = tuple(crop) if crop else (0, 0, width, height)
+        desc = RenderDesc(width=width, height=height, samples=samples, tile_size=tile_size)
+        desc.crop[:] = self.crop
+        self.components = self.library.channels()
+        self._create("render_start", integrator.pointer, scene.pointer, ctypes.byref(desc))
+
+    def wait(self, milliseconds):
+        """Status after at most that time. Raises the render's own error once it failed, Cancelled once it stopped."""
+        status = Status()
+        self._call("render_wait", milliseconds, ctypes.byref(status))
+        return status
+
+    def next_tile(self):
+        """(x0, y0, x1, y1) of a finished tile, each once; None: none now."""
+        tile = Tile()
+        self._call("render_next_tile", ctypes.byref(tile))
+        return (tile.x0, tile.y0, tile.x1, tile.y1) if tile.x1 else None
+
+    def read(self, channel, rect=None):
+        """(height, width, components) float32, top row first."""
+        x0, y0, x1, y1 = rect or self.crop
+        out = np.empty((y1 - y0, x1 - x0, self.components[channel]), np.float32)
+        self._call("render_read", channel.encode(), ctypes.byref(Tile(x0=x0, y0=y0, x1=x1, y1=y1)), out.ctypes.data)
+        return out

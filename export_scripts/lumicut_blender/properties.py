@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Settings of a scene. Those of the integrators are drawn from the library's own parameter tables, none is named here."""
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
+
+from . import library, runtime
+
+COMMON = "common"  # the group of parameters that all integrators share
+ACCELS = [
+    ("agglomerative", "Agglomerative BVH", "The library's own tree: shares nothing with the host"),
+    ("embree", "Embree", "Intel's tree. On Blender from blender.org, which carries an Embree of its own, the two may clash"),
+]
+PASSES = {  # of the library's channels: pass name, property, label
+    "albedo": ("Albedo", "use_pass_albedo", "Albedo", "Diffuse and specular reflectance", "RGB", "COLOR"),
+    "cut_size": ("Lumicut Cut Size", "use_pass_cut_size", "Cut Size", "Heat map: clusters or lights summed, a sample", "X", "VALUE"),
+    "rays": ("Lumicut Rays", "use_pass_rays", "Shadow Rays", "Heat map: shadow rays, a sample", "X", "VALUE"),
+    "bounds": ("Lumicut Bounds", "use_pass_bounds", "Bounds", "Heat map: error bounds evaluated, a sample", "X", "VALUE"),
+}
+
+PRESETS = {
+    # name: (label, tooltip, own settings, integrator, parameters of whatever group has them)
+    "draft": ("Draft", "A first look: one sample, few lights, wide bounds",
+              {"samples": 1}, "illumination_cut", {"vpls": 10000, "error": 0.05}),
+    "good": ("Good", "For most images: antialiased, 60,000 lights, error about 2 %",
+             {"samples": 9}, "illumination_cut", {"vpls": 60000, "error": 0.02}),
+    "reference": ("Reference", "Sums all of 200,000 lights at every point: slow, and the truth of many lights",
+                  {"samples": 16}, "exhaustive", {"vpls": 200000}),
+}
+
+
+def property_of(parameter):
+    """The Blender property that a row of the library's table asks for."""
+    unit = parameter["unit"]
+    text = parameter["description"] + (f" [{unit}]" if unit else "")
+    common = {"name": parameter["label"], "description": text}
+    default = parameter["default_text"]
+    low, high = parameter["minimum"], parameter["maximum"]
+    if parameter["type"] == library.BOOL:
+        return BoolProperty(default=default in {"1", "true"}, **common)
+    if parameter["type"] == library.CHOICE:
+        names = parameter["choices"].split("|")
+        items = [(name, name.replace("_", " ").capitalize(), text) for name in names]
+        return EnumProperty(items=items, default=default, **common)
+    if parameter["type"] == library.INT:
+        limit = 2**31 - 1
+        return IntProperty(default=int(default), min=int(max(low, -limit)), max=int(min(high, limit)), **common)
+    return FloatProperty(default=float(default), min=low, max=min(high, 3e38), precision=4, step=1,
+                         subtype="DISTANCE" if unit == "scene units" else "NONE", **common)
+
+
+def text_of(value):
+    """As lumicut_integrator_set takes it. Blender keeps floats in single precision: 0.02 must not become 0.0199999996."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:.7g}" if isinstance(value, float) else str(value)
+
+
+class Tables:
+    """The parameter tables, parted into what all integrators share and what each has alone."""
+
+    def __init__(self, integrators):
+        self.integrators = integrators
+        ids = [{p["id"] for p in parameters} for *_, parameters in integrators]
+        self.common_ids = set.intersection(*ids) if ids else set()
+
+    def groups(self):
+        """[(group, [parameters])]; the common ones first."""
+        if not self.integrators:
+            return []
+        first = self.integrators[0][4]
+        result = [(COMMON, [p for p in first if p["id"] in self.common_ids])]
+        for identifier, *_, parameters in self.integrators:
+            result.append((identifier, [p for p in parameters if p["id"] not in self.common_ids]))
+        return result
+
+    def group(self, name):
+        return dict(self.groups()).get(name, [])
+
+
+tables = Tables([])
+_classes = []
+
+
+class LumicutViewLayerSettings(bpy.types.PropertyGroup):
+    use_pass_albedo: BoolProperty(name="Albedo", description=PASSES["albedo"][3])
+    use_pass_cut_size: BoolProperty(name="Cut Size", description=PASSES["cut_size"][3])
+    use_pass_rays: BoolProperty(name="Shadow Rays", description=PASSES["rays"][3])
+    use_pass_bounds: BoolProperty(name="Bounds", description=PASSES["bounds"][3])
+
+
+def parameters_of(settings, integrator=None):
+    """{name: text} of an integrator's parameters as the scene has them."""
+    integrator = integrator or settings.integrator
+    result = {}
+    for group, parameters in tables.groups():
+        if group not in {COMMON, integrator}:
+            continue
+        values = getattr(settings, group)
+        for p in parameters:
+            result[p["id"]] = text_of(getattr(values, p["id"]))
+    return result
+
+
+def apply_preset(settings, name):
+    _, _, own, integrator, values = PRESETS[name]
+    for key, value in own.items():
+        setattr(settings, key, value)
+    known = [row[0] for row in tables.integrators]
+    settings.integrator = integrator if integrator in known else known[0]
+    for group, parameters in tables.groups():
+        if group not in {COMMON, settings.integrator}:
+            continue
+        for p in parameters:
+            target = getattr(settings, group)
+            if p["id"] in values:
+                setattr(target, p["id"], values[p["id"]])
+            elif p["id"] != "seed":
+                target.property_unset(p["id"])
+
+
+def register():
+    global tables
+    lib = runtime.loaded()
+    tables = Tables(lib.integrators() if lib is not None else [])
+    annotations = {
+        "samples": IntProperty(name="Samples", description="Samples a pixel, for edges, texture and depth of field. One lies at the pixel's centre",
+                               default=4, min=1, max=65536, soft_max=64),
+        "accel": EnumProperty(name="Tree for Rays", description="What finds the triangles that rays hit", items=ACCELS, default="agglomerative"),
+        "max_shininess": FloatProperty(name="Gloss Limit", description="Largest exponent of a glossy lobe. Sharper ones show the virtual lights as blots",
+                                       default=300.0, min=1.0, max=100000.0),
+        "viewport_lights": IntProperty(name="Viewport Lights", description="Virtual lights while the viewport renders",
+                                       default=5000, min=100, max=1000000),
+        "threads": IntProperty(name="Threads", description="0: all", default=0, min=0, max=1024),
+    }
+    if tables.integrators:
+        identifiers = [row[0] for row in tables.integrators]
+        annotations["integrator"] = EnumProperty(
+            name="Integrator", description="How the virtual lights are summed",
+            items=[(i, label, f"{text}. {source}") for i, label, text, source, _ in tables.integrators],
+            default="illumination_cut" if "illumination_cut" in identifiers else identifiers[0])
+    for group, parameters in tables.groups():
+        cls = type(f"LumicutParameters_{group}", (bpy.types.PropertyGroup,),
+                   {"__annotations__": {p["id"]: property_of(p) for p in parameters}})
+        bpy.utils.register_class(cls)
+        _classes.append(cls)
+        annotations[group] = PointerProperty(type=cls)
+    settings = type("LumicutSettings", (bpy.types.PropertyGroup,), {"__annotations__": annotations})
+    for cls in (settings, LumicutViewLayerSettings):
+        bpy.utils.register_class(cls)
+        _classes.append(cls)
+    bpy.types.Scene.lumicut = PointerProperty(type=settings)
+    bpy.types.ViewLayer.lumicut = PointerProperty(type=LumicutViewLayerSettings)
+
+
+def unregister():
+    del bpy.types.ViewLayer.lumicut
+    del bpy.types.Scene.lumicut
+    while _classes:
+        bpy.utils.unregister_class(_classes.pop())

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scene as plain arrays: what collecting makes, the library takes and the exporter writes. Nothing of Blender in it."""
+import dataclasses
+
+import numpy as np
+
+from . import library
+
+
+@dataclasses.dataclass
+class Image:
+    """Texels as they are stored: (h, w, channels) of uint8 or float32, top row first. A colour has 1 or 3, a mask 1."""
+    name: str
+    pixels: np.ndarray
+    flags: int = 0  # library.SRGB | CLAMP | NEAREST
+
+
+@dataclasses.dataclass
+class Mesh:
+    name: str
+    positions: np.ndarray                # (n, 3)
+    indices: np.ndarray                  # (t, 3)
+    normals: np.ndarray | None = None    # (n, 3); None: flat
+    uvs: np.ndarray | None = None        # (n, 2)
+    materials: np.ndarray | None = None  # (t,) indices into the scene's; None: `material` for all
+    material: int = 0
+    transforms: list = dataclasses.field(default_factory=list)  # 3x4 each, one an instance
+
+
+def baked(mesh):
+    """(positions, normals, indices) of a mesh with one instance, in the world: no tree of trees for what stands alone.
+
+    In double precision, as io/scene_json.cpp has it, so that an exported scene is the same one.
+    """
+    m = np.array(mesh.transforms[0], np.float32).astype(np.float64).reshape(3, 4)
+    p = mesh.positions.astype(np.float64)
+    positions = np.stack([m[r, 0] * p[:, 0] + m[r, 1] * p[:, 1] + m[r, 2] * p[:, 2] + m[r, 3] for r in range(3)], 1)
+    c = m[:, 0], m[:, 1], m[:, 2]
+    determinant = np.cross(c[0], c[1]) @ c[2]
+    sign = -1.0 if determinant < 0 else 1.0
+    normals, indices = mesh.normals, mesh.indices
+    if normals is not None:  # by the cofactors: the inverse transpose up to the determinant
+        n = normals.astype(np.float64)
+        turned = sum(np.outer(n[:, k], np.cross(c[(k + 1) % 3], c[(k + 2) % 3]) * sign) for k in range(3))
+        length = np.linalg.norm(turned, axis=1)
+        normals = np.where((length > 0)[:, None], turned / np.where(length > 0, length, 1)[:, None], n).astype(np.float32)
+    if determinant < 0:
+        indices = indices[:, [0, 2, 1]]
+    return positions.astype(np.float32), normals, indices
+
+
+def is_flat(transform):
+    """Whether an instance has no volume: nothing of it can be seen from most sides, and normals do not exist."""
+    m = np.array(transform, np.float64).reshape(3, 4)
+    return not abs(np.linalg.det(m[:, :3])) > 0
+
+
+@dataclasses.dataclass
+class SceneData:
+    meshes: list = dataclasses.field(default_factory=list)
+    materials: list = dataclasses.field(default_factory=list)  # (name, library.Material)
+    images: list = dataclasses.field(default_factory=list)     # of materials' and environment's 1-based numbers
+    lights: list = dataclasses.field(default_factory=list)     # (name, library.Light)
+    environment: library.Environment | None = None
+    camera: library.Camera | None = None
+
+    def triangles(self):
+        return sum(len(mesh.indices) * len(mesh.transforms) for mesh in self.meshes)
+
+    def upload(self, scene, check=lambda: None):
+        """Describes itself to a library.Scene. `check` is called between meshes, and may raise."""
+        scene.set_textures([(image.pixels, image.flags) for image in self.images])
+        scene.set_materials([material for _, material in self.materials])
+        for mesh in self.meshes:
+            check()
+            if len(mesh.transforms) == 1:
+                positions, normals, indices = baked(mesh)
+                scene.add_mesh(positions, indices, normals, mesh.uvs, mesh.materials, mesh.material)
+            else:
+                scene.add_mesh(mesh.positions, mesh.indices, mesh.normals, mesh.uvs, mesh.materials, mesh.material,
+                               np.array(mesh.transforms, np.float32))
+        scene.set_lights([light for _, light in self.lights])
+        scene.set_environment(self.environment)
+        scene.set_camera(self.camera)

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The engine in 3D views: coarse pictures first, then finer ones, in a thread of their own.
+
+The interface's thread collects what changed and draws the last picture; uploading, building and rendering are the
+worker's. A new view or scene cancels what runs; nothing waits for it.
+"""
+import threading
+import traceback
+import weakref
+
+import bpy
+import gpu
+import numpy as np
+from gpu_extras.presets import draw_texture_2d
+
+from . import collect, library, properties, runtime
+from .nodes import Images
+from .report import Report
+
+# (pixels of the view a pixel of the picture, integrator or None for the scene's own, its parameters)
+LEVELS = (
+    (8, "stochastic_lightcuts", {"lights": "16"}),
+    (3, "stochastic_lightcuts", {"lights": "32"}),
+    (1, None, {}),
+)
+_sessions = weakref.WeakSet()
+TICK = 0.05
+
+
+class Session:
+    """One 3D view."""
+
+    def __init__(self, engine):
+        self.engine = weakref.ref(engine)
+        self.condition = threading.Condition()
+        self.request = None      # (scene data or None for "as before", camera, size, settings)
+        self.running = None      # what the worker would have to cancel
+        self.closed = False
+        self.picture, self.picture_number, self.shown = None, 0, -1  # (h, w, 4), bottom row first
+        self.texture, self.texture_number = None, -1
+        self.message, self.told = "collecting", ""
+        self.cache, self.images = collect.MeshCache(), None
+        self.data, self.settings, self.view = None, None, None
+        self.levels_done = 0
+        self.thread = None
+        _sessions.add(self)
+        if not bpy.app.timers.is_registered(_tick):
+            bpy.app.timers.register(_tick, first_interval=TICK)
+
+    # ---- The interface's side -----------------------------------------------------------------------------------
+
+    def update(self, engine, context, depsgraph):
+        updated = {u.id.name_full for u in depsgraph.updates if u.is_updated_geometry}
+        self.cache.forget(updated)
+        report = Report()
+        if self.images is None or any(isinstance(u.id, bpy.types.Image) for u in depsgraph.updates):
+            self.images = Images(report)
+        self.images.report = report
+        settings = depsgraph.scene.lumicut
+        try:
+            data = collect.Collector(depsgraph, report, cache=self.cache, images=self.images,
+                                     max_shininess=settings.max_shininess).collect()
+        except Exception as error:
+            traceback.print_exc()
+            self.message = f"collecting failed: {error}"
+            return
+        self.data = data
+        self.settings = self._settings(settings)
+        self.view = None  # the next draw asks for it
+        runtime.last["notes"] = report.lines()
+        engine.tag_redraw()
+
+    @staticmethod
+    def _settings(settings):
+        parameters = properties.parameters_of(settings)
+        parameters["vpls"] = str(settings.viewport_lights)
+        common = {p["id"] for p in properties.tables.group(properties.COMMON)}
+        return {"integrator": settings.integrator, "parameters": parameters, "accel": settings.accel,
+                "threads": settings.threads, "common": {k: v for k, v in parameters.items() if k in common}}
+
+    def draw(self, engine, context, depsgraph):
+        region = context.region
+        width, height = region.width, region.height
+        if self.data is None and not self.message.startswith("collecting failed"):
+            self.update(engine, context, depsgraph)
+        if self.data is not None and runtime.loaded() is not None:
+            camera = collect.viewport_camera(context, width, height)
+            view = (bytes(camera), width, height)
+            if view != self.view:
+                new_scene = self.view is None
+                self.view = view
+                self._ask(self.data if new_scene else None, camera, (width, height))
+        elif runtime.loaded() is None:
+            self.message = "the library is not loaded: see the render properties"
+        self._paint(width, height)
+        if self.message != self.told:
+            self.told = self.message
+            engine.update_stats("Lumicut", self.message)
+
+    def _ask(self, data, camera, size):
+        with self.condition:
+            if data is None and self.request is not None:
+                data = self.request[0]  # not yet begun: its scene still waits
+            self.request = (data, camera, size, self.settings)
+            if self.running is not None:
+                self.running.cancel()
+            if self.thread is None:
+                self.thread = threading.Thread(target=self._work, name="lumicut viewport", daemon=True)
+                self.thread.start()
+            self.condition.notify()
+
+    def _paint(self, width, height):
+        with self.condition:
+            picture, number = self.picture, self.picture_number
+        if picture is None:
+            return
+        if self.texture is None or self.texture_number != number:
+            rows, columns = picture.shape[:2]
+            buffer = gpu.types.Buffer("FLOAT", rows * columns * 4, picture.reshape(-1))
+            self.texture = gpu.types.GPUTexture((columns, rows), format="RGBA16F", data=buffer)
+            self.texture_number = number
+        engine = self.engine()
+        gpu.state.blend_set("ALPHA_PREMULT")
+        engine.bind_display_space_shader(bpy.context.scene)
+        draw_texture_2d(self.texture, (0, 0), width, height)
+        engine.unbind_display_space_shader()
+        gpu.state.blend_set("NONE")
+        self.shown = number
+
+    def close(self, wait=False):
+        with self.condition:
+            self.closed = True
+            if self.running is not None:
+                self.running.cancel()
+            self.condition.notify()
+        if wait and self.thread is not None:
+            self.thread.join(5)
+
+    # ---- The worker's side --------------------------------------------------------------------------------------
+
+    def _cancelled(self):
+        return self.closed or self.request is not None
+
+    def _guarded(self, handle, fn):
+        """fn(), which a new request cancels through `handle`."""
+        with self.condition:
+            if self._cancelled():
+                raise library.Cancelled(library.CANCELLED, "a newer view waits")
+            self.running = handle
+        try:
+            return fn()
+        finally:
+            with self.condition:
+                self.running = None
+
+    def _work(self):
+        scene, integrators = None, {}
+        pending = None  # scene data that was not yet uploaded when a newer view came
+        while True:
+            with self.condition:
+                while self.request is None and not self.closed:
+                    self.condition.wait()
+                if self.closed:
+                    break
+                data, camera, size, settings = self.request
+                self.request = None
+            pending = data or pending
+            try:
+                device = runtime.device(settings["threads"])
+                if pending is not None:
+                    self.message = "building"
+                    fresh = library.Scene(device, settings["accel"])
+                    pending.camera = camera
+                    pending.upload(fresh, self._raise_if_cancelled)
+                    self._guarded(fresh, fresh.commit)
+                    scene, integrators, pending = fresh, {}, None
+                scene.set_camera(camera)
+                self._guarded(scene, scene.commit)
+                self._render_levels(device, scene, integrators, size, settings)
+                self.message = "done"
+            except library.Cancelled:
+                continue
+            except (library.Error, library.LibraryMissing) as error:
+                self.message = f"failed: {error}"
+            except Exception as error:
+                traceback.print_exc()
+                self.message = f"failed: {error}"
+
+    def _raise_if_cancelled(self):
+        if self._cancelled():
+            raise library.Cancelled(library.CANCELLED, "a newer view waits")
+
+    def _render_levels(self, device, scene, integrators, size, settings):
+        known = {row[0] for row in properties.tables.integrators}
+        for number, (divisor, name, extra) in enumerate(LEVELS):
+            if name not in known:
+                name, extra = settings["integrator"], {}
+            key = (name, number if extra else None)
+            if key not in integrators:
+                integrator = library.Integrator(device, name)
+                wanted = settings["parameters"] if name == settings["integrator"] else settings["common"]
+                for parameter, value in (wanted | extra).items():
+                    integrator.set(parameter, value)
+                integrators[key] = integrator
+            width, height = max(1, size[0] // divisor), max(1, size[1] // divisor)
+            self.message = f"{width} x {height}"
+            with library.Render(integrators[key], scene, width, height) as render:
+                self._guarded(render, lambda: render.wait(library.FOREVER))
+                radiance, alpha = render.read("radiance"), render.read("alpha")
+            picture = np.ones((height, width, 4), np.float32)
+            picture[..., :3] = radiance[::-1]
+            if scene_is_transparent(self.data):
+                picture[..., 3] = alpha[::-1, :, 0]
+            with self.condition:
+                self.picture = np.ascontiguousarray(np.minimum(picture, 60000.0))  # of half floats
+                self.picture_number += 1
+                self.levels_done = number + 1
+
+
+def scene_is_transparent(data):
+    return data is not None and data.environment is not None and bool(data.environment.flags & library.ENVIRONMENT_HIDDEN)
+
+
+def _tick():
+    """Redraws views that have news: drawing belongs to the interface's thread."""
+    alive = False
+    for session in list(_sessions):
+        if session.closed:
+            continue
+        alive = True
+        engine = session.engine()
+        try:
+            if engine is None:
+                session.close()
+            elif session.shown != session.picture_number and session.picture is not None or session.message != session.told:
+                engine.tag_redraw()
+        except ReferenceError:  # Blender has freed it
+            session.close()
+    return TICK if alive else None
+
+
+def of(engine):
+    session = getattr(engine, "_session", None)
+    if session is None:
+        session = engine._session = Session(engine)
+    return session
+
+
+def forget(engine):
+    try:
+        session = engine.__dict__.get("_session")
+    except (AttributeError, ReferenceError):
+        return
+    if session is not None:
+        session.close()
+
+
+def stop_all():
+    for session in list(_sessions):
+        session.close(wait=True)
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)

@@ -1,0 +1,228 @@
+"""The add-on itself: switching on and off, the library's tables, what is missing, many renders in one process."""
+import ctypes
+import os
+import pathlib
+import re
+import unittest
+
+import addon_utils
+import bpy
+
+import helpers as h
+import lumicut_blender
+from lumicut_blender import engine, library, properties, runtime
+
+PACKAGE = pathlib.Path(lumicut_blender.__file__).resolve().parent
+
+
+class Registration(unittest.TestCase):
+    def setUp(self):
+        h.new_scene()
+
+    def tearDown(self):
+        addon_utils.enable("lumicut_blender")
+
+    def engines(self):
+        return [getattr(cls, "bl_idname", "") for cls in bpy.types.RenderEngine.__subclasses__() if cls.is_registered]
+
+    def test_it_goes_away_and_comes_back_and_renders_still(self):
+        for _ in range(3):
+            addon_utils.disable("lumicut_blender")
+            self.assertNotIn("LUMICUT", self.engines())
+            self.assertFalse(hasattr(bpy.types.Scene, "lumicut"))
+            self.assertFalse(hasattr(bpy.types, "LUMICUT_PT_integrator"))
+            self.assertFalse([p for p in bpy.types.Panel.__subclasses__()
+                              if "LUMICUT" in getattr(p, "COMPAT_ENGINES", ())
+                              and p.__module__.split(".")[0] != "lumicut_blender"])
+            self.assertIsNotNone(addon_utils.enable("lumicut_blender"))
+            self.assertIn("LUMICUT", self.engines())
+        h.add_plane()
+        with h.quiet():
+            h.set_lumicut(vpls=100)
+            h.render()
+
+    def test_reloading_scripts_keeps_it_working(self):
+        import importlib
+        addon_utils.disable("lumicut_blender")
+        importlib.reload(lumicut_blender)
+        addon_utils.enable("lumicut_blender")
+        h.add_plane()
+        with h.quiet():
+            h.set_lumicut(vpls=100)
+            h.render()
+
+    def test_panels_of_cycles_are_left_alone(self):
+        for panel in bpy.types.Panel.__subclasses__():
+            if panel.__module__.startswith("cycles"):
+                self.assertNotIn("LUMICUT", panel.COMPAT_ENGINES, panel.__name__)
+
+
+class Tables(unittest.TestCase):
+    def setUp(self):
+        h.new_scene()
+
+    def test_every_parameter_of_the_library_is_a_property_with_its_default(self):
+        settings = bpy.context.scene.lumicut
+        rows = runtime.require().integrators()
+        self.assertGreater(len(rows), 4)
+        for identifier, _, _, _, parameters in rows:
+            text = properties.parameters_of(settings, identifier)
+            self.assertEqual(set(text), {p["id"] for p in parameters})
+            for p in parameters:
+                if p["type"] in (library.INT, library.FLOAT):
+                    self.assertEqual(float(text[p["id"]]), float(p["default_text"]), (identifier, p["id"]))
+                else:
+                    self.assertEqual(text[p["id"]], p["default_text"], (identifier, p["id"]))
+
+    def test_tooltips_and_ranges_are_the_librarys(self):
+        settings = bpy.context.scene.lumicut
+        row = next(r for r in runtime.require().integrators() if r[0] == "lightcuts")
+        error = next(p for p in row[4] if p["id"] == "error")
+        prop = settings.lightcuts.bl_rna.properties["error"]
+        self.assertIn(error["description"], prop.description)
+        self.assertEqual((prop.hard_min, prop.hard_max), (error["minimum"], error["maximum"]))
+
+    def test_every_integrator_renders_what_it_is_set_to(self):
+        h.add_plane(material=h.diffuse())
+        h.add_light("POINT")
+        for identifier, *_ in runtime.require().integrators():
+            with self.subTest(integrator=identifier), h.quiet():
+                h.set_lumicut(identifier, vpls=200)
+                self.assertGreater(h.radiance(h.render()).mean(), 0.01)
+                self.assertEqual(h.last_stats()["integrator"], identifier)
+
+    def test_presets_set_what_they_promise(self):
+        settings = bpy.context.scene.lumicut
+        for name, (_, _, own, integrator, values) in properties.PRESETS.items():
+            bpy.ops.lumicut.preset(preset=name)
+            self.assertEqual(settings.integrator, integrator)
+            text = properties.parameters_of(settings)
+            for key, value in values.items():
+                self.assertAlmostEqual(float(text[key]), value, places=6)
+            for key, value in own.items():
+                self.assertEqual(getattr(settings, key), value)
+
+    def test_both_trees_give_the_same_image(self):
+        import numpy as np
+        h.add_plane(material=h.diffuse())
+        h.add_sphere(0.5, (0, 0, 0.5))
+        h.add_light("POINT", energy=100, shadow_soft_size=0)
+        images = []
+        for accel in ("agglomerative", "embree"):
+            bpy.context.scene.lumicut.accel = accel
+            with h.quiet():
+                h.set_lumicut(vpls=300)
+                images.append(h.radiance(h.render()))
+        # Rays that graze edges may end on either side: single pixels, never areas.
+        self.assertLess((np.abs(images[0] - images[1]).max(-1) > 0.01).mean(), 0.02)
+
+    def test_statistics_are_those_of_the_last_render(self):
+        h.add_plane(material=h.diffuse())
+        h.add_light("POINT")
+        with h.quiet():
+            h.set_lumicut("lightcuts", vpls=500)
+            h.render()
+        last = h.last_stats()
+        self.assertEqual(last["scene"], {"triangles": 2, "instances": 1, "meshes": 1, "lamps": 1})
+        self.assertGreater(last["stats"]["counters"]["points"], 0)
+        self.assertIn("light tree", last["stats"]["phases"])
+
+
+class TheLibrary(unittest.TestCase):
+    def test_structures_have_the_sizes_and_fields_of_the_header(self):
+        header = (h.ROOT / "plugin/include/lumicut/lumicut.h").read_text()
+        for cls in library.SIZES:
+            name = "lumicut_" + re.sub(r"(?<!^)([A-Z])", r"_\1", cls.__name__).lower()
+            body = re.search(r"typedef struct " + name + r" \{(.*?)\} " + name + ";", header, re.S)[1]
+            body = re.sub(r"/\*.*?\*/", "", body, flags=re.S)
+            fields = []
+            for line in body.split(";"):
+                line = line.strip()
+                if "(*" in line:
+                    fields.append(re.search(r"\(\*(\w+)\)", line)[1])
+                elif line:
+                    fields += [re.sub(r"\[.*", "", part).split()[-1].lstrip("*") for part in line.split(",")]
+            self.assertEqual([f for f, _ in cls._fields_], fields, name)
+            self.assertEqual(ctypes.sizeof(cls), library.SIZES[cls])
+
+    def test_all_ctypes_are_in_one_file(self):
+        for path in PACKAGE.glob("*.py"):
+            if path.name != "library.py":
+                self.assertNotIn("ctypes", path.read_text(), path.name)
+
+    def test_imports_are_blenders_numpys_and_pythons_own(self):
+        import sys
+        allowed = set(sys.stdlib_module_names) | {"bpy", "gpu", "gpu_extras", "bpy_extras", "mathutils", "numpy"}
+        for path in PACKAGE.glob("*.py"):
+            for name in re.findall(r"^\s*(?:import|from)\s+([A-Za-z_]\w*)", path.read_text(), re.M):
+                self.assertIn(name, allowed, path.name)
+
+    def test_a_missing_library_is_named_and_so_is_the_cure(self):
+        saved = os.environ.pop("LUMICUT_LIBRARY", None)
+        candidates = library.candidates
+        library.candidates = lambda _="": [("preference", "/nowhere/liblumicut.so.1")]
+        try:
+            with self.assertRaisesRegex(library.LibraryMissing, "nowhere.*preferences"):
+                library.Library()
+        finally:
+            library.candidates = candidates
+            if saved:
+                os.environ["LUMICUT_LIBRARY"] = saved
+
+    def test_errors_of_the_library_name_field_and_value(self):
+        device = library.Device(runtime.require())
+        scene = library.Scene(device)
+        with self.assertRaisesRegex(library.Error, "lumicut_material.*diffuse"):
+            scene.set_materials([library.Material(diffuse=(ctypes.c_float * 3)(2, 0, 0))])
+
+    def test_a_scene_without_a_camera_is_an_error(self):
+        scene = h.new_scene()
+        bpy.data.objects.remove(scene.camera)
+        h.add_plane()
+        with h.quiet():
+            h.set_lumicut(vpls=100)
+            with self.assertRaisesRegex(RuntimeError, "camera"):
+                bpy.ops.render.render()
+
+
+class ManyRenders(unittest.TestCase):
+    def test_fifty_renders_do_not_grow_the_process(self):
+        h.new_scene(48, 32)
+        h.add_plane(material=h.diffuse())
+        for i in range(20):
+            h.add_sphere(0.2, (i % 5 - 2, i // 5 - 2, 0.3), h.diffuse(), 64)
+        h.add_light("POINT")
+
+        def resident():
+            with open("/proc/self/statm") as f:
+                return int(f.read().split()[1]) * os.sysconf("SC_PAGESIZE")
+
+        sizes = []
+        with h.quiet():
+            h.set_lumicut("illumination_cut", vpls=2000)
+            for _ in range(50):
+                bpy.ops.render.render()
+                sizes.append(resident())
+        scene_bytes = 20 * 64 * 32 * 2 * 3 * 24
+        # A scene that stayed would add its meshes' bytes each time; allocators may keep a few of them at first.
+        growth = sizes[-1] - sizes[14]
+        self.assertLess(growth, 35 * scene_bytes / 10, f"{[s >> 20 for s in sizes]} MiB")
+
+
+class Passes(unittest.TestCase):
+    def test_a_pass_is_written_by_one_copy(self):
+        import numpy as np
+
+        class Rect:
+            calls = []
+
+            def foreach_set(self, array):
+                self.calls.append(array)
+
+        class Pass:
+            rect = Rect()
+
+        pixels = np.arange(24, dtype=np.float32).reshape(2, 4, 3)
+        engine.write_pass(Pass, pixels)
+        self.assertEqual(len(Rect.calls), 1)
+        np.testing.assert_array_equal(Rect.calls[0].reshape(2, 4, 3), pixels[::-1])
