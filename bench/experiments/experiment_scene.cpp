@@ -100,8 +100,8 @@ std::unique_ptr<ExperimentScene> make_room(const std::string& name, uint32_t sid
                           panel({350, 590, -175}, {400, 0, 0}, {0, 0, 200}, 10)});
   } else {
     view = {{1.211f, 1.80475f, 3.85239f}, {0.7729f, 1.76308f, 2.95443f}, 50};
-    s->scene->set_lights(
-        {panel({-0.5f, 2.9f, 1.0f}, {1, 0, 0}, {0, 0, 1}, 6), panel({0.5f, 2.6f, -1.5f}, {0.3f, 0, 0}, {0, 0, 0.3f}, 20)});
+    s->scene->set_lights({panel({-0.5f, 2.9f, 1.0f}, {1, 0, 0}, {0, 0, 1}, 6),
+                          panel({0.5f, 2.6f, -1.5f}, {0.3f, 0, 0}, {0, 0, 0.3f}, 20)});
   }
   Progress progress;
   s->scene->commit(progress);
@@ -123,19 +123,20 @@ std::unique_ptr<ExperimentScene> make_lantern(const BenchMesh& mesh, uint32_t si
   auto s = std::make_unique<ExperimentScene>();
   s->name = mesh.name;
   s->scene = std::make_unique<Scene>(Scene::Config{});
-  s->scene->set_materials({Material{.diffuse = {0.6f, 0.6f, 0.6f}}, Material{.diffuse = {0.6f, 0.6f, 0.6f}, .emission = {5, 4, 3}}});
+  s->scene->set_materials(
+      {Material{.diffuse = {0.6f, 0.6f, 0.6f}}, Material{.diffuse = {0.6f, 0.6f, 0.6f}, .emission = {5, 4, 3}}});
   BenchMesh box;
   for (int i = 0; i < 8; ++i)
     box.positions.push_back({i & 1 ? 1.0f : -1.0f, i & 2 ? 2.0f : 0.0f, i & 4 ? 1.0f : -1.0f});
-  for (const auto& q : {std::array<uint32_t, 4>{0, 1, 5, 4}, {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 3, 7, 5}, {0, 1, 3, 2}, {4, 5, 7, 6}})
+  for (const auto& q :
+       {std::array<uint32_t, 4>{0, 1, 5, 4}, {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 3, 7, 5}, {0, 1, 3, 2}, {4, 5, 7, 6}})
     for (const uint32_t k : {0, 1, 2, 0, 2, 3}) box.indices.push_back(q[k]);
   add_mesh(*s->scene, box, 0);
   BenchMesh lamp = mesh;
   Aabb b;
   for (const Vec3f& p : mesh.positions) b.extend(p);
   const float scale = 0.8f / b.extent().y;
-  for (Vec3f& p : lamp.positions)
-    p = (p - Vec3f{b.center().x, b.lo.y, b.center().z}) * scale + Vec3f{0, 0.01f, 0};
+  for (Vec3f& p : lamp.positions) p = (p - Vec3f{b.center().x, b.lo.y, b.center().z}) * scale + Vec3f{0, 0.01f, 0};
   add_mesh(*s->scene, lamp, 1);
   Progress progress;
   s->scene->commit(progress);

@@ -198,12 +198,13 @@ std::vector<Rgb> light_slice(const ExperimentScene& s, const Slices& slices, uin
       std::vector<float> weights(normalise.size()), d;
       for (size_t r = 0; r < normalise.size(); ++r)
         if (r != own) d.push_back(distance2(features[own], features[r]));
+      if (d.empty()) d.push_back(1.0f);
       const size_t k = std::min<size_t>(3, d.size() - 1);
       std::nth_element(d.begin(), d.begin() + static_cast<std::ptrdiff_t>(k), d.end());
       const float unit = std::max(d[k], 1e-20f);
       for (size_t r = 0; r < weights.size(); ++r)
-        weights[r] = normalise[r] *
-                     (r == own ? 1.0f : 0.01f + 0.5f * std::exp(-distance2(features[own], features[r]) / unit));
+        weights[r] =
+            normalise[r] * (r == own ? 1.0f : 0.01f + 0.5f * std::exp(-distance2(features[own], features[r]) / unit));
       ColumnClusters clusters(initial, weights);
       clusters.split(kColumns, progress);
       std::vector<ScaledLight> list;
@@ -307,11 +308,11 @@ bool records(const char* name) {
                   mean / static_cast<double>(h.records.size()));
     }
   for (const size_t count : {64, 256}) {
-    std::printf("%zu records:\n  %-34s %7s | %-24s | %-24s | %8s | %s\n", count, "placement", "records",
-                "LightSlice RMSE", "cache RMSE", "M rays", "placing / rendering, CPU");
+    std::printf("%zu records:\n  %-31s %7s | %-23s | %9s | %-23s | %6s | %s\n", count, "placement", "records",
+                "LightSlice RMSE", "its mean", "cache RMSE", "M rays", "placing / rendering, CPU");
     const Slices ours = build_slices(s->points, count, 16, s->scene->radius());
     const auto row = [&](const char* label, const std::function<Records(uint64_t)>& place, bool own_slices) {
-      Score slice_error, cache_error, number;
+      Score slice_error, slice_mean, cache_error, number;
       double placing = 0, rendering = 0;
       uint64_t rays = 0;
       for (uint64_t seed = 1; seed <= kSeeds; ++seed) {
@@ -321,19 +322,23 @@ bool records(const char* name) {
         std::vector<Rgb> image;
         rendering += time_of([&] { image = light_slice(*s, slices, seed, rays); });
         slice_error.add(rmse(image, s->reference));
+        slice_mean.add(100 * mean_error(image, s->reference));
         cache_error.add(rmse(cache(*s, harmonic, r), s->reference_indirect));
         number.add(static_cast<double>(r.size()));
       }
-      std::printf("  %-34s %7.1f | %.4f (%.4f..%.4f)  | %.4f (%.4f..%.4f)  | %8.2f | %.3f\n", label,
+      std::printf("  %-31s %7.1f | %.4f (%.4f..%.4f) | %7.2f %% | %.4f (%.4f..%.4f) | %6.2f | %.3f\n", label,
                   number.sum / number.n, slice_error.sum / slice_error.n, slice_error.lo, slice_error.hi,
-                  cache_error.sum / cache_error.n, cache_error.lo, cache_error.hi, static_cast<double>(rays) / 1e6,
-                  placing / rendering);
+                  slice_mean.sum / slice_mean.n, cache_error.sum / cache_error.n, cache_error.lo, cache_error.hi,
+                  static_cast<double>(rays) / 1e6, placing / rendering);
       std::fflush(stdout);
     };
-    row("halving (the renderer's)",
+    row(
+        "halving (the renderer's)",
         [&](uint64_t) { return build_slices(s->points, count, 16, s->scene->radius()).representatives; }, true);
-    row("the same, points to the nearest", [&](uint64_t) { return ours.representatives; }, false);
-    row("jittered grid", [&](uint64_t seed) { return jittered(*s, count, seed); }, false);
+    row(
+        "the same, points to the nearest", [&](uint64_t) { return ours.representatives; }, false);
+    row(
+        "jittered grid", [&](uint64_t seed) { return jittered(*s, count, seed); }, false);
     for (const auto& [label, in] : {std::pair{"uniform", &uniform}, {"harmonic", &local}}) {
       const double dart = factor_for(count, [&](double f) { return darts(*in, f, 1).size(); });
       row((std::string("darts, ") + label + " radius").c_str(), [&](uint64_t seed) { return darts(*in, dart, seed); },

@@ -229,32 +229,59 @@ bool separation(const char* name) {
   Progress progress;
   const WspdTree tree = WspdTree::build(s->lights.lights, {.separation = 100.0f}, progress);
   const auto points = static_cast<double>(s->points.size());
-  std::printf("\n## separation, %s: %ux%u, %zu lights, %zu octree nodes; CPU relative to the first row of a separation\n",
-              name, s->side, s->side, tree.lights().size(), tree.nodes().size());
-  std::printf("%-5s %-17s | %9s | %9s %9s | %7s %7s | %8s %8s | %s\n", "eps", "bound", "pairs", "clusters", "rays",
-              "RMSE", "mean", "bounding", "shading", "mean radius");
-  for (const double eps : {0.15, 0.25, 0.4}) {
-    double first_bound = 0, first_shade = 0, first_radius = 0;
+  std::printf("\n## separation, %s: %ux%u, %zu lights, %zu octree nodes\n", name, s->side, s->side,
+              tree.lights().size(), tree.nodes().size());
+  std::printf(
+      "at equal mean error: beside \"ball, box centre\" at the separation that gives it (interpolated); CPU relative "
+      "to "
+      "\"ball, box centre\"\n");
+  std::printf("%-5s %-17s | %8s | %8s %8s | %6s %6s | %-22s | %7s %7s | %s\n", "eps", "bound", "pairs", "clusters",
+              "rays", "RMSE", "mean", "equal error: pairs rays", "bound.", "shade", "radius");
+  struct Row {
+    double pairs, clusters, rays, rmse, mean, bounding, shading, radius;
+  };
+  const auto measure = [&](Bound kind, double eps) {
+    Row row{};
+    Bounds bounds;
+    std::vector<std::vector<uint32_t>> pairs;
+    size_t count = 0;
+    row.bounding = time_of([&] {
+      bounds = make_bounds(tree, kind);
+      pairs = find_pairs(tree, bounds, eps, count);
+    });
+    Result r;
+    row.shading = time_of([&] { r = shade(*s, tree, bounds, pairs, eps); });
+    for (uint32_t n = 0; n < tree.nodes().size(); ++n) row.radius += bounds.size(n);
+    row.pairs = static_cast<double>(count);
+    row.clusters = static_cast<double>(r.clusters) / points, row.rays = static_cast<double>(r.rays) / points;
+    row.rmse = rmse(r.image, s->reference), row.mean = mean_error(r.image, s->reference);
+    return row;
+  };
+  const double steps[] = {0.1, 0.125, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6};
+  std::vector<Row> centre;
+  for (const double eps : steps) centre.push_back(measure(Bound::centre, eps));
+  // What "ball, box centre" takes for that mean error; logarithms between neighbours of the sweep. 0 beyond its ends.
+  const auto at_equal_error = [&](double mean, double Row::*what) {
+    for (size_t i = 0; i + 1 < centre.size(); ++i) {
+      if (!(centre[i].mean <= mean && mean <= centre[i + 1].mean)) continue;
+      const double t = std::log(mean / centre[i].mean) / std::log(centre[i + 1].mean / centre[i].mean);
+      return centre[i].*what * std::pow(centre[i + 1].*what / (centre[i].*what), t);
+    }
+    return 0.0;
+  };
+  for (const size_t step : {2, 4, 6}) {
+    const Row& first = centre[step];
     for (const auto& [label, kind] : {std::pair{"ball, box centre", Bound::centre},
                                       {"ball, least", Bound::least},
                                       {"ball, merged", Bound::merged},
                                       {"box", Bound::box}}) {
-      Bounds bounds;
-      std::vector<std::vector<uint32_t>> pairs;
-      size_t count = 0;
-      const double bounding = time_of([&] {
-        bounds = make_bounds(tree, kind);
-        pairs = find_pairs(tree, bounds, eps, count);
-      });
-      Result r;
-      const double shading = time_of([&] { r = shade(*s, tree, bounds, pairs, eps); });
-      double radius = 0;
-      for (uint32_t n = 0; n < tree.nodes().size(); ++n) radius += bounds.size(n);
-      if (kind == Bound::centre) first_bound = bounding, first_shade = shading, first_radius = radius;
-      std::printf("%-5.2f %-17s | %9zu | %9.1f %9.1f | %7.4f %6.2f%% | %8.2f %8.2f | %.3f\n", eps, label, count,
-                  static_cast<double>(r.clusters) / points, static_cast<double>(r.rays) / points,
-                  rmse(r.image, s->reference), 100 * mean_error(r.image, s->reference), bounding / first_bound,
-                  shading / first_shade, radius / first_radius);
+      const Row row = kind == Bound::centre ? first : measure(kind, steps[step]);
+      const double equal_pairs = at_equal_error(row.mean, &Row::pairs),
+                   equal_rays = at_equal_error(row.mean, &Row::rays);
+      std::printf("%-5.2f %-17s | %8.0f | %8.1f %8.1f | %.4f %5.2f%% | %11.2f %11.2f | %7.2f %7.2f | %.3f\n",
+                  steps[step], label, row.pairs, row.clusters, row.rays, row.rmse, 100 * row.mean,
+                  equal_pairs > 0 ? row.pairs / equal_pairs : 0.0, equal_rays > 0 ? row.rays / equal_rays : 0.0,
+                  row.bounding / first.bounding, row.shading / first.shading, row.radius / first.radius);
       std::fflush(stdout);
     }
   }
