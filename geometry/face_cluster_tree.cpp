@@ -87,6 +87,11 @@ void FaceClusterTree::rebalance(uint32_t n, int& steps) {
   const auto consider = [&](const Choice& c) {
     // Lengths are few and small near the leaves: most choices there tie, and balance decides.
     const bool shorter = c.gamma < gamma_now || (c.gamma == gamma_now && c.gain > kLeastGain);
+    if (polishing_) {
+      if (c.gain <= kLeastGain || c.gamma > (1 + options_.slack) * gamma_now) return;
+      if (best.kind < 0 || c.gain > best.gain) best = c;
+      return;
+    }
     if (unbalanced ? c.beta >= beta_now : (c.beta >= options_.tau || !shorter)) return;
     if (best.kind < 0 || c.gamma < best.gamma || (c.gamma == best.gamma && c.gain > best.gain)) best = c;
   };
@@ -100,7 +105,7 @@ void FaceClusterTree::rebalance(uint32_t n, int& steps) {
         s[i][j] = shared(nodes_[left[i]].perimeter, nodes_[right[j]].perimeter);
   // Rotations: one grandchild joins the other side. In a balanced node only the one whose new pair shares most counts.
   int most = 1;
-  if (!unbalanced)
+  if (!unbalanced && !polishing_)
     for (int i = 0; i < 2; ++i)
       most = std::max({most, l_inner ? s[i][0] + s[i][1] : 0, r_inner ? s[0][i] + s[1][i] : 0});
   const auto weight = [&](uint32_t x) { return nodes_[x].weight; };
@@ -122,7 +127,7 @@ void FaceClusterTree::rebalance(uint32_t n, int& steps) {
                  cd = (length(right[0]) + length(right[1]) - length(r)) / 2;
     for (int j = 0; j < 2; ++j) {
       const int x = s[0][j], y = s[1][1 - j];
-      if (x == 0 || y == 0 || (!unbalanced && (x < ab || y < cd))) continue;
+      if (x == 0 || y == 0 || (!unbalanced && !polishing_ && (x < ab || y < cd))) continue;
       const double beta = imbalance_of(weight(left[0]) + weight(right[j]), weight(left[1]) + weight(right[1 - j]));
       const double gain = beta_now + imbalance(l) + imbalance(r) - beta -
                           imbalance_of(weight(left[0]), weight(right[j])) -
@@ -159,9 +164,10 @@ FaceClusterTree::FaceClusterTree(const FaceMesh& mesh, std::span<const double> w
   const auto n = static_cast<uint32_t>(mesh.faces.size());
   if (!weights.empty() && weights.size() != n)
     fail_argument("face clusters: " + std::to_string(weights.size()) + " weights for " + std::to_string(n) + " faces");
-  if (!(options.alpha >= 0 && options.alpha < 1e6) || !(options.tau > 0))
-    fail_argument("face clusters: alpha " + std::to_string(options.alpha) + " or tau " + std::to_string(options.tau) +
-                  " is out of range");
+  if (!(options.alpha >= 0 && options.alpha < 1e6) || !(options.tau > 0) ||
+      !(options.slack >= 0 && options.slack < 1e6))
+    fail_argument("face clusters: alpha " + std::to_string(options.alpha) + ", tau " + std::to_string(options.tau) +
+                  " or slack " + std::to_string(options.slack) + " is out of range");
   nodes_.reserve(2 * static_cast<size_t>(n));
   nodes_.resize(n);
   for (uint32_t f = 0; f < n; ++f) {
@@ -227,16 +233,20 @@ FaceClusterTree::FaceClusterTree(const FaceMesh& mesh, std::span<const double> w
   settle();
 }
 
-// Passes over all nodes, leaves first, until the mean imbalance falls no more.
+// Passes over all nodes, leaves first, until the mean imbalance falls no more; then the same for balance first.
 void FaceClusterTree::settle() {
-  for (int pass = 0; pass < options_.max_passes; ++pass) {
-    const double before = mean_imbalance(false);
-    for (const uint32_t x : postorder()) {
-      int steps = options_.max_steps;
-      rebalance(x, steps);
+  for (const bool polishing : {false, true}) {
+    polishing_ = polishing;
+    for (int pass = 0; pass < options_.max_passes; ++pass) {
+      const double before = mean_imbalance(false);
+      for (const uint32_t x : postorder()) {
+        int steps = options_.max_steps;
+        rebalance(x, steps);
+      }
+      if (!(mean_imbalance(false) < 0.99 * before)) break;
     }
-    if (!(mean_imbalance(false) < 0.99 * before)) break;
   }
+  polishing_ = false;
 }
 
 std::vector<uint32_t> FaceClusterTree::postorder() const {
