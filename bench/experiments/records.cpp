@@ -105,8 +105,9 @@ struct Hit {
   Records records;
   size_t bound;
 };
-Hit hitting(const Instance& in, double factor) {
-  const HittingSet set = solve_hitting_set(in.at, disks(in, factor), {.bound_iterations = 60});
+Hit hitting(const Instance& in, double factor, bool quick = false) {
+  const HittingSet set =
+      solve_hitting_set(in.at, disks(in, factor), {.local_search = !quick, .bound_iterations = quick ? 10 : 60});
   Hit h{{}, set.lower_bound};
   for (const uint32_t p : set.points) h.records.push_back(in.point[p]);
   return h;
@@ -349,7 +350,7 @@ bool records(const char* name) {
       const double dart = factor_for(count, [&](double f) { return darts(*in, f, 1).size(); });
       row((std::string("darts, ") + label + " radius").c_str(), [&](uint64_t seed) { return darts(*in, dart, seed); },
           false);
-      const double hit = factor_for(count, [&](double f) { return hitting(*in, f).records.size(); });
+      const double hit = factor_for(count, [&](double f) { return hitting(*in, f, true).records.size(); });
       Records set;  // it does not depend on the seed
       row((std::string("hitting set, ") + label + " radius").c_str(),
           [&](uint64_t seed) { return seed == 1 ? set = hitting(*in, hit).records : set; }, false);
