@@ -231,7 +231,7 @@ Cut cut(const ExperimentScene& s, const std::vector<Vpl>& lights, const Tree& tr
         };
         heap.assign(1, estimate(root, nullptr));
         Rgb sum = heap[0].estimate;
-        while (heap[0].bound > kError * luminance(sum)) {
+        while (heap[0].bound > kError * std::max(0.0f, luminance(sum))) {
           std::pop_heap(heap.begin(), heap.end());
           const Entry e = heap.back();
           heap.pop_back();
