@@ -137,6 +137,15 @@ std::unique_ptr<ExperimentScene> make_lantern(const BenchMesh& mesh, uint32_t si
   for (const Vec3f& p : mesh.positions) b.extend(p);
   const float scale = 0.8f / b.extent().y;
   for (Vec3f& p : lamp.positions) p = (p - Vec3f{b.center().x, b.lo.y, b.center().z}) * scale + Vec3f{0, 0.01f, 0};
+  // Scans are wound either way; this one glows outwards.
+  double volume = 0;
+  for (size_t t = 0; t < lamp.triangles(); ++t) {
+    const Vec3f &a = lamp.positions[lamp.indices[3 * t]], &c = lamp.positions[lamp.indices[3 * t + 1]],
+                &d = lamp.positions[lamp.indices[3 * t + 2]];
+    volume += static_cast<double>(dot(a, cross(c, d)));
+  }
+  for (size_t t = 0; volume < 0 && t < lamp.triangles(); ++t)
+    std::swap(lamp.indices[3 * t + 1], lamp.indices[3 * t + 2]);
   add_mesh(*s->scene, lamp, 1);
   Progress progress;
   s->scene->commit(progress);
