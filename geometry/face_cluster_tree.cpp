@@ -13,6 +13,8 @@
 namespace lumicut {
 namespace {
 
+constexpr double kLeastGain = 1e-9;  // so that roundings move nothing for ever
+
 using Edges = std::vector<uint32_t>;
 
 int shared(const Edges& a, const Edges& b) {
@@ -68,6 +70,7 @@ struct FaceClusterTree::Choice {
   int kind = -1;  // 0: l and its parent's place, 1: swap
   uint32_t keep = kNone, pair_a = kNone, pair_b = kNone, other_a = kNone, other_b = kNone;
   double gamma = 0, beta = 0;
+  double gain = 0;  // imbalance that the nodes whose children change have less in sum
 };
 
 // Fig. 3 after the text of sec. 3.2. Afterwards the children that were newly paired are looked at in turn.
@@ -82,8 +85,15 @@ void FaceClusterTree::rebalance(uint32_t n, int& steps) {
   const bool unbalanced = beta_now > options_.tau;
   Choice best;
   const auto consider = [&](const Choice& c) {
-    if (unbalanced ? c.beta >= beta_now : (c.beta >= options_.tau || c.gamma >= gamma_now)) return;
-    if (best.kind < 0 || c.gamma < best.gamma) best = c;
+    // Lengths are few and small near the leaves: most choices there tie, and balance decides.
+    const bool shorter = c.gamma < gamma_now || (c.gamma == gamma_now && c.gain > kLeastGain);
+    if (polishing_) {
+      if (c.gain <= kLeastGain || c.gamma > (1 + options_.slack) * gamma_now) return;
+      if (best.kind < 0 || c.gain > best.gain) best = c;
+      return;
+    }
+    if (unbalanced ? c.beta >= beta_now : (c.beta >= options_.tau || !shorter)) return;
+    if (best.kind < 0 || c.gamma < best.gamma || (c.gamma == best.gamma && c.gain > best.gain)) best = c;
   };
   // Shared edges between grandchildren (a leaf child stands for itself).
   const uint32_t left[2] = {l_inner ? nodes_[l].left : l, l_inner ? nodes_[l].right : kNone};
@@ -94,38 +104,37 @@ void FaceClusterTree::rebalance(uint32_t n, int& steps) {
       if (left[i] != kNone && right[j] != kNone)
         s[i][j] = shared(nodes_[left[i]].perimeter, nodes_[right[j]].perimeter);
   // Rotations: one grandchild joins the other side. In a balanced node only the one whose new pair shares most counts.
-  Choice rotation;
-  int most = 0;
+  int most = 1;
+  if (!unbalanced && !polishing_)
+    for (int i = 0; i < 2; ++i)
+      most = std::max({most, l_inner ? s[i][0] + s[i][1] : 0, r_inner ? s[0][i] + s[1][i] : 0});
+  const auto weight = [&](uint32_t x) { return nodes_[x].weight; };
   const auto rotate = [&](uint32_t keep, uint32_t joins, uint32_t with, int common) {
-    if (common == 0 || (!unbalanced && common <= most)) return;
-    most = common;
+    if (common < most) return;
     const double pair = length(joins) + length(with) - 2.0 * common;
-    rotation = {0,
-                keep,
-                joins,
-                with,
-                kNone,
-                kNone,
-                gamma(length(keep), pair),
-                imbalance_of(nodes_[keep].weight, nodes_[joins].weight + nodes_[with].weight)};
-    if (unbalanced) consider(rotation);
+    const double beta = imbalance_of(weight(keep), weight(joins) + weight(with));
+    const double gain =
+        beta_now + imbalance_of(weight(keep), weight(joins)) - beta - imbalance_of(weight(joins), weight(with));
+    consider({0, keep, joins, with, kNone, kNone, gamma(length(keep), pair), beta, gain});
   };
   if (l_inner)
     for (int i = 0; i < 2; ++i) rotate(left[1 - i], left[i], r, s[i][0] + s[i][1]);
   if (r_inner)
     for (int j = 0; j < 2; ++j) rotate(right[1 - j], right[j], l, s[0][j] + s[1][j]);
-  if (!unbalanced && rotation.kind == 0) consider(rotation);
   // Swaps: both new pairs must share as much as the pairs that are, unless it is balance that is wanted.
   if (l_inner && r_inner) {
     const double ab = (length(left[0]) + length(left[1]) - length(l)) / 2,
                  cd = (length(right[0]) + length(right[1]) - length(r)) / 2;
     for (int j = 0; j < 2; ++j) {
       const int x = s[0][j], y = s[1][1 - j];
-      if (x == 0 || y == 0 || (!unbalanced && (x < ab || y < cd))) continue;
+      if (x == 0 || y == 0 || (!unbalanced && !polishing_ && (x < ab || y < cd))) continue;
+      const double beta = imbalance_of(weight(left[0]) + weight(right[j]), weight(left[1]) + weight(right[1 - j]));
+      const double gain = beta_now + imbalance(l) + imbalance(r) - beta -
+                          imbalance_of(weight(left[0]), weight(right[j])) -
+                          imbalance_of(weight(left[1]), weight(right[1 - j]));
       consider({1, kNone, left[0], right[j], left[1], right[1 - j],
                 gamma(length(left[0]) + length(right[j]) - 2.0 * x, length(left[1]) + length(right[1 - j]) - 2.0 * y),
-                imbalance_of(nodes_[left[0]].weight + nodes_[right[j]].weight,
-                             nodes_[left[1]].weight + nodes_[right[1 - j]].weight)});
+                beta, gain});
     }
   }
   if (best.kind < 0) return;
@@ -155,9 +164,10 @@ FaceClusterTree::FaceClusterTree(const FaceMesh& mesh, std::span<const double> w
   const auto n = static_cast<uint32_t>(mesh.faces.size());
   if (!weights.empty() && weights.size() != n)
     fail_argument("face clusters: " + std::to_string(weights.size()) + " weights for " + std::to_string(n) + " faces");
-  if (!(options.alpha >= 0 && options.alpha < 1e6) || !(options.tau > 0))
-    fail_argument("face clusters: alpha " + std::to_string(options.alpha) + " or tau " + std::to_string(options.tau) +
-                  " is out of range");
+  if (!(options.alpha >= 0 && options.alpha < 1e6) || !(options.tau > 0) ||
+      !(options.slack >= 0 && options.slack < 1e6))
+    fail_argument("face clusters: alpha " + std::to_string(options.alpha) + ", tau " + std::to_string(options.tau) +
+                  " or slack " + std::to_string(options.slack) + " is out of range");
   nodes_.reserve(2 * static_cast<size_t>(n));
   nodes_.resize(n);
   for (uint32_t f = 0; f < n; ++f) {
@@ -223,16 +233,20 @@ FaceClusterTree::FaceClusterTree(const FaceMesh& mesh, std::span<const double> w
   settle();
 }
 
-// Passes over all nodes, leaves first, until the mean imbalance falls no more.
+// Passes over all nodes, leaves first, until the mean imbalance falls no more; then the same for balance first.
 void FaceClusterTree::settle() {
-  for (int pass = 0; pass < options_.max_passes; ++pass) {
-    const double before = mean_imbalance(false);
-    for (const uint32_t x : postorder()) {
-      int steps = options_.max_steps;
-      rebalance(x, steps);
+  for (const bool polishing : {false, true}) {
+    polishing_ = polishing;
+    for (int pass = 0; pass < options_.max_passes; ++pass) {
+      const double before = mean_imbalance(false);
+      for (const uint32_t x : postorder()) {
+        int steps = options_.max_steps;
+        rebalance(x, steps);
+      }
+      if (!(mean_imbalance(false) < 0.99 * before)) break;
     }
-    if (!(mean_imbalance(false) < 0.99 * before)) break;
   }
+  polishing_ = false;
 }
 
 std::vector<uint32_t> FaceClusterTree::postorder() const {

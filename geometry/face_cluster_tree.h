@@ -6,6 +6,8 @@
 // - the choice follows the text of sec. 3.2, not Fig. 3: an unbalanced node takes the compactest perturbation that
 // brings
 //   it closer to balance, whether or not that is compacter than what it is - out of all that keep both clusters joined.
+// - of perturbations with equal perimeters the one of least imbalance is taken, and a last phase takes what lessens it
+//   and makes perimeters at most `slack` longer: near the leaves perimeters alone decide little.
 // - the mutual recursion of Fig. 3 need not end; a call makes at most `max_steps` perturbations.
 // - components of the mesh are built apart and then joined by weight; on non-manifold edges an edge is in a perimeter
 //   when an odd number of its faces is in the cluster.
@@ -22,6 +24,7 @@ namespace lumicut {
 struct FaceClusterTreeOptions {
   double alpha = 0.25;  // Eq. 2
   double tau = 1.0;     // imbalance that is still acceptable
+  double slack = 0.1;   // share by which a last phase may lengthen perimeters for balance
   int max_steps = 24;   // perturbations that one rebalancing may cause
   int max_passes = 16;  // over the whole tree, after building and after new weights
 };
@@ -79,6 +82,7 @@ class FaceClusterTree {
   std::vector<Node> nodes_;
   uint32_t root_ = kNone;
   size_t perturbations_ = 0;
+  bool polishing_ = false;  // the last phase
 };
 
 }  // namespace lumicut
