@@ -4,8 +4,7 @@
 // - perimeters are exact sorted lists of edge ids, joined by symmetric difference; they take a fraction of the Bloom
 //   filters' memory. `bloom_statistics` says what the filters would lose and take (Tables 1-4, 6, 7).
 // - the choice follows the text of sec. 3.2, not Fig. 3: an unbalanced node takes the compactest perturbation that
-// brings
-//   it closer to balance, whether or not that is compacter than what it is - out of all that keep both clusters joined.
+//   brings it closer to balance, compacter than what it is or not, out of all that keep both clusters joined.
 // - of perturbations with equal perimeters the one of least imbalance is taken, and a last phase takes what lessens it
 //   and makes perimeters at most `slack` longer: near the leaves perimeters alone decide little.
 // - the mutual recursion of Fig. 3 need not end; a call makes at most `max_steps` perturbations.

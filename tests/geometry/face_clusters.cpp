@@ -235,6 +235,20 @@ TEST(FaceClusterTree, StaysBalancedAndNearlyConnected) {
   EXPECT_LT(t.mean_imbalance(false), 1.0);
 }
 
+TEST(FaceClusterTree, SlackTradesPerimeterForBalance) {
+  const FaceMesh m = sphere_mesh(30);
+  FaceClusterTreeOptions none;
+  none.slack = 0;
+  const FaceClusterTree strict(m, {}, none), loose(m, {});
+  EXPECT_LT(loose.mean_imbalance(false), strict.mean_imbalance(false));
+  // Each exchange may lengthen perimeters by the slack at most; together they lengthen them by less.
+  EXPECT_LT(static_cast<double>(loose.perimeter_bytes()), 1.1 * static_cast<double>(strict.perimeter_bytes()));
+  const DualGraph g = dual_graph(m);
+  EXPECT_LE(loose.disconnected_clusters(g), m.faces.size() / 50);
+  none.slack = -1;
+  EXPECT_THROW(FaceClusterTree(m, {}, none), Error);
+}
+
 TEST(FaceClusterTree, BloomFiltersLoseWhatCollisionsTake) {
   const FaceMesh m = torus_mesh(40, 20);
   const FaceClusterTree t(m, {});
