@@ -1,12 +1,6 @@
 // The policies of boxes and of balls.
 #include "accel/agglomerate.h"
 
-// Under sanitizers each instruction set takes minutes to compile: one, and the fallback.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#undef HWY_DISABLED_TARGETS
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3)
-#endif
-
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "accel/agglomerate.cpp"
 #include <hwy/foreach_target.h>

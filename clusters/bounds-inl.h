@@ -21,6 +21,15 @@ HWY_INLINE V Square(V a) { return hn::Mul(a, a); }
 // Largest extent of the box with half sizes `half` along the unit vector `a`.
 HWY_INLINE V Reach(const V3& a, const V3& half) { return Dot({hn::Abs(a.x), hn::Abs(a.y), hn::Abs(a.z)}, half); }
 
+// Squared distance from the origin to the box with half sizes `half` around `to_center`.
+HWY_INLINE V Dist2(D d, const V3& to_center, const V3& half) {
+  const V zero = hn::Zero(d);
+  const V dx = hn::Max(zero, hn::Sub(hn::Abs(to_center.x), half.x));
+  const V dy = hn::Max(zero, hn::Sub(hn::Abs(to_center.y), half.y));
+  const V dz = hn::Max(zero, hn::Sub(hn::Abs(to_center.z), half.z));
+  return hn::Add(Square(dx), hn::Add(Square(dy), Square(dz)));
+}
+
 // Largest cosine that a vector of a box can make with the z axis, from the box's centre and half sizes in a frame whose
 // z is the axis: the highest z over the least distance from the axis (below the horizon: the largest).
 HWY_INLINE V LargestCosine(D d, V x, V y, V z, V half_x, V half_y, V half_z) {
@@ -90,11 +99,7 @@ HWY_INLINE void Bounds(const LightNode& node, const PointBlock& block, float cla
     } else {
       const V3 position = Load3(d, block.position, i);
       to_center = {hn::Sub(center.x, position.x), hn::Sub(center.y, position.y), hn::Sub(center.z, position.z)};
-      const V dx = hn::Max(zero, hn::Sub(hn::Abs(to_center.x), half.x));
-      const V dy = hn::Max(zero, hn::Sub(hn::Abs(to_center.y), half.y));
-      const V dz = hn::Max(zero, hn::Sub(hn::Abs(to_center.z), half.z));
-      const V dist2 = hn::Add(Square(dx), hn::Add(Square(dy), Square(dz)));
-      geometry = hn::Div(one, hn::Max(hn::Max(dist2, hn::Set(d, clamp2)), hn::Set(d, 1e-30f)));
+      geometry = hn::Div(one, hn::Max(hn::Max(Dist2(d, to_center, half), hn::Set(d, clamp2)), hn::Set(d, 1e-30f)));
       if constexpr (kKind == VplKind::oriented || kKind == VplKind::spot) {
         // From the lights to the point: the box turned around.
         const V x = hn::Neg(Dot(to_center, Set3(d, node.tangent))),

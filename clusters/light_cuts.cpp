@@ -20,11 +20,10 @@ HWY_INLINE V LuminanceOf(D d, V r, V g, V b) {
   return hn::MulAdd(hn::Set(d, 0.0722f), b, hn::MulAdd(hn::Set(d, 0.7152f), g, hn::Mul(hn::Set(d, 0.2126f), r)));
 }
 
-HWY_INLINE void Increment(D d, hn::Mask<D> mask, uint32_t* counts) {
+HWY_INLINE void Increment(hn::Mask<D> mask, uint32_t* counts) {
   const DU du;
   const auto one = hn::IfThenElseZero(hn::RebindMask(du, mask), hn::Set(du, 1));
   hn::Store(hn::Add(hn::Load(du, counts), one), du, counts);
-  (void)d;
 }
 
 // Unshadowed estimates of the points in `active`, and which of them get any.
@@ -90,7 +89,7 @@ HWY_INLINE void TraceEstimates(const Accel& accel, const Vpl& light, const Rgb& 
       hn::StoreU(hn::Compress(hn::Load(d, block.position[1] + i), mask), d, cuts.y + n);
       hn::StoreU(hn::Compress(hn::Load(d, block.position[2] + i), mask), d, cuts.z + n);
       n += hn::CountTrue(d, mask);
-      Increment(d, mask, cuts.rays[g] + i);
+      Increment(mask, cuts.rays[g] + i);
     }
   }
   if (n == 0) return;
@@ -131,7 +130,7 @@ void AddNode(const LightTree& tree, const Accel& accel, const CutOptions& o, uin
     uint32_t reached = 0;
     for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
       const auto asked = MaskOf(d, active[g], i);
-      Increment(d, asked, cuts.bounds[g] + i);
+      Increment(asked, cuts.bounds[g] + i);
       reached |= BitsOf(d, hn::And(asked, hn::Gt(hn::Load(d, e.bound[g] + i), zero)), i);
     }
     e.active[g] = static_cast<uint16_t>(reached);
@@ -167,7 +166,7 @@ void AddNode(const LightTree& tree, const Accel& accel, const CutOptions& o, uin
     for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
       const auto mask = MaskOf(d, e.active[g], i);
       V total = hn::Load(d, cuts.luminance[g] + i);
-      Increment(d, mask, cuts.clusters[g] + i);
+      Increment(mask, cuts.clusters[g] + i);
       if (lit) {
         const V est[3] = {hn::Load(d, e.estimate[0][g] + i), hn::Load(d, e.estimate[1][g] + i),
                           hn::Load(d, e.estimate[2][g] + i)};

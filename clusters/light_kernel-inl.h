@@ -1,4 +1,4 @@
-// Unshadowed light at vectors of points: what light_kernel.cpp and light_cuts.cpp share.
+// Unshadowed light at vectors of points: what light_kernel.cpp, block_kernel.cpp and light_cuts.cpp share.
 // Compiled once a target: included again by each pass of foreach_target.h.
 #if defined(LUMICUT_CLUSTERS_LIGHT_KERNEL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef LUMICUT_CLUSTERS_LIGHT_KERNEL_INL_H_
@@ -54,16 +54,20 @@ HWY_INLINE V Geometry(D d, const Vpl& light, float clamp2, const V3& position, c
   return hn::Mul(geometry, hn::Max(zero, Dot(normal, to_light)));
 }
 
+// cosine^shininess, 0 from the horizon on.
+HWY_INLINE V Lobe(D d, V cosine, V shininess) {
+  const V base = hn::Min(hn::Max(cosine, hn::Set(d, 1e-20f)), hn::Set(d, 1.0f));
+  const V lobe = hn::Exp(d, hn::Max(hn::Mul(shininess, hn::Log(d, base)), hn::Set(d, -80.0f)));
+  return hn::IfThenElseZero(hn::Gt(cosine, hn::Zero(d)), lobe);
+}
+
 // BRDF towards `to_light` at points [p, p + Lanes(d)) of ShadePoints or a PointBlock.
 template <bool kGlossy, class Points>
 HWY_INLINE V3 Reflectance(D d, const Points& points, size_t p, const V3& to_light) {
   V3 f = Load3(d, points.diffuse, p);
   if constexpr (kGlossy) {
     const V3 specular = Load3(d, points.specular, p);
-    const V cosine = Dot(Load3(d, points.mirror, p), to_light);
-    const V base = hn::Min(hn::Max(cosine, hn::Set(d, 1e-20f)), hn::Set(d, 1.0f));
-    V lobe = hn::Exp(d, hn::Max(hn::Mul(Load1(d, points.shininess, p), hn::Log(d, base)), hn::Set(d, -80.0f)));
-    lobe = hn::IfThenElseZero(hn::Gt(cosine, hn::Zero(d)), lobe);
+    const V lobe = Lobe(d, Dot(Load3(d, points.mirror, p), to_light), Load1(d, points.shininess, p));
     f = {hn::MulAdd(specular.x, lobe, f.x), hn::MulAdd(specular.y, lobe, f.y), hn::MulAdd(specular.z, lobe, f.z)};
   }
   return f;

@@ -1,11 +1,5 @@
 #include "clusters/light_policy.h"
 
-// Under sanitizers each instruction set takes minutes to compile: one, and the fallback.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#undef HWY_DISABLED_TARGETS
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3)
-#endif
-
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "clusters/light_policy.cpp"
 #include <hwy/foreach_target.h>

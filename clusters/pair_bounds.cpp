@@ -15,14 +15,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 
-HWY_INLINE V Dist2(D d, const V3& to_center, const V3& half) {
-  const V zero = hn::Zero(d);
-  const V dx = hn::Max(zero, hn::Sub(hn::Abs(to_center.x), half.x));
-  const V dy = hn::Max(zero, hn::Sub(hn::Abs(to_center.y), half.y));
-  const V dz = hn::Max(zero, hn::Sub(hn::Abs(to_center.z), half.z));
-  return hn::Add(Square(dx), hn::Add(Square(dy), Square(dz)));
-}
-
 HWY_INLINE V3 Add3(const V3& a, const V3& b) { return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)}; }
 HWY_INLINE V3 Sub3(const V3& a, const V3& b) { return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)}; }
 

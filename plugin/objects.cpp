@@ -106,12 +106,6 @@ std::string stats_json(double seconds, const Stats& stats) {
 
 namespace {
 
-std::unique_ptr<tbb::global_control> control_for(int threads) {
-  if (threads <= hardware_threads()) return nullptr;
-  return std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
-                                               static_cast<size_t>(threads));
-}
-
 VplOptions vpl_options(const Params& params) {
   VplOptions o;
   o.count = static_cast<uint32_t>(params.integer("vpls"));
@@ -140,8 +134,7 @@ std::string tracing_key(const Params& params) {
 
 using namespace lumicut;
 
-lumicut_device_t::lumicut_device_t(int threads, const Log& host_log)
-    : more_threads(control_for(threads)), arena(threads), log(host_log) {}
+lumicut_device_t::lumicut_device_t(int threads, const Log& host_log) : arena(threads), log(host_log) {}
 
 void lumicut_scene_t::require_committed() const {
   if (scene.version() == 0) fail_state("lumicut_scene: it was never committed");

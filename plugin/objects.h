@@ -1,8 +1,6 @@
 // What stands behind the handles of lumicut.h.
 #pragma once
 
-#include <tbb/global_control.h>
-
 #include <chrono>
 #include <memory>
 #include <mutex>
@@ -85,7 +83,6 @@ struct lumicut_device_t : lumicut::ObjectOf<lumicut_device_t> {
   static constexpr auto kKind = lumicut::HandleKind::device;
   lumicut_device_t(int threads, const lumicut::Log& host_log);
 
-  std::unique_ptr<tbb::global_control> more_threads;  // where the host asks for more than the hardware has
   lumicut::Arena arena;
   lumicut::Log log;
   std::string stats_text;
