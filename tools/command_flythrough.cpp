@@ -17,6 +17,7 @@
 #include "io/vpl_file.h"
 #include "lumicut/lumicut_state.h"
 #include "tools/commands.h"
+#include "tools/render_setup.h"
 
 namespace lumicut::tools {
 
@@ -24,13 +25,10 @@ using nlohmann::ordered_json;
 
 namespace {
 
-struct Options {
-  std::string scene, cameras, integrator = "wspd", output, png, stats, vpl_in, size, save_state, load_state,
-                              accel = "embree", rays = "robust";
-  std::vector<std::string> parameters;
+struct Options : RenderSetup {
+  Options() { integrator = "wspd"; }
+  std::string scene, cameras, output, png, stats, vpl_in, size, save_state, load_state;
   uint32_t samples = 0;
-  int threads = 0;
-  uint64_t seed = 0, vpls = 0;
   bool quiet = false;
   float exposure = 0;
 };
@@ -147,32 +145,14 @@ class FlythroughCommand {
  private:
   const io::Api& api() const { return library_.api(); }
 
-  void set_parameter(const std::string& name, const std::string& value) {
-    if (api().integrator_set(integrator_.get(), name.c_str(), value.c_str()) != LUMICUT_OK)
-      throw UsageError(api().last_error());
-  }
-
   void create() {
     lumicut_device_desc desc{};
     desc.struct_size = sizeof(desc);
     desc.abi_major = LUMICUT_ABI_MAJOR;
     desc.threads = o_.threads;
     io::check(api(), api().device_create(&desc, device_.out()), "device");
-    lumicut_scene_desc scene{};
-    scene.struct_size = sizeof(scene);
-    scene.accel = o_.accel.c_str();
-    scene.robust = o_.rays == "robust" ? 1 : 0;
-    if (api().scene_create(device_.get(), &scene, scene_.out()) != LUMICUT_OK ||
-        api().integrator_create(device_.get(), o_.integrator.c_str(), integrator_.out()) != LUMICUT_OK)
-      throw UsageError(api().last_error());
-    if (o_.vpls > 0) set_parameter("vpls", std::to_string(o_.vpls));
-    if (o_.seed > 0) set_parameter("seed", std::to_string(o_.seed));
-    for (const auto& parameter : o_.parameters) {
-      const size_t equals = parameter.find('=');
-      if (equals == std::string::npos || equals == 0)
-        throw UsageError(fmt::format("-p {}: must be name=value", parameter));
-      set_parameter(parameter.substr(0, equals), parameter.substr(equals + 1));
-    }
+    create_scene(api(), o_, device_.get(), scene_);
+    create_integrator(api(), o_, device_.get(), integrator_);
     state_ = static_cast<const lumicut_state_extension*>(api().get_extension(LUMICUT_STATE_EXTENSION));
     if (state_ == nullptr && !(o_.save_state.empty() && o_.load_state.empty()))
       throw UsageError("--save-state, --load-state: this library has no extension " LUMICUT_STATE_EXTENSION);
@@ -292,10 +272,7 @@ void add_flythrough(CLI::App& app) {
   const auto o = std::make_shared<Options>();
   command->add_option("scene", o->scene, "Scene, JSON: docs/scene_format.md")->required();
   command->add_option("cameras", o->cameras, "Cameras, JSON: docs/command_line.md")->required();
-  command->add_option("-i,--integrator", o->integrator, "How to sum the lights; `lumicut info` lists them")
-      ->capture_default_str();
-  command->add_option("-p,--parameter", o->parameters, "name=value, as `lumicut info` lists them; may be repeated")
-      ->allow_extra_args(false);
+  add_setup_options(*command, *o);
   command->add_option("-o,--output", o->output, "EXR to write for each view: a.exr becomes a.0000.exr, ...");
   command->add_option("--png", o->png, "PNG to write for each view");
   command->add_option("--exposure", o->exposure, "Factor from radiance to [0,1] for the PNGs (default: each its own)")
@@ -303,15 +280,8 @@ void add_flythrough(CLI::App& app) {
   command->add_option("--save-state", o->save_state, "File for what was prepared, to be loaded in later runs");
   command->add_option("--load-state", o->load_state, "Take what a run with the same scene and parameters has saved")
       ->excludes("--save-state");
-  command->add_option("--vpls", o->vpls, "Number of virtual lights; as -p vpls=N");
-  command->add_option("--seed", o->seed, "Seed of all randomness; as -p seed=N");
   command->add_option("--size", o->size, "WIDTHxHEIGHT in pixels (default: the scene's)");
   command->add_option("--spp", o->samples, "Samples a pixel (default: the scene's)")->check(CLI::Range(1, 65536));
-  command->add_option("--threads", o->threads, "Threads; 0: all")->capture_default_str()->check(CLI::Range(0, 4096));
-  command->add_option("--accel", o->accel, "How rays are traced: embree or agglomerative")->capture_default_str();
-  command->add_option("--rays", o->rays, "robust: none slips between two triangles; fast: some may, in less time")
-      ->check(CLI::IsMember({"robust", "fast"}))
-      ->capture_default_str();
   command->add_option("--vpl-in", o->vpl_in, "Take the virtual lights from this file");
   command->add_option("--stats", o->stats, "JSON file of seconds and counts to write");
   command->add_flag("-q,--quiet", o->quiet, "Nothing on the terminal");

@@ -22,6 +22,7 @@
 #include "tools/commands.h"
 #include "tools/heat_map.h"
 #include "tools/progress_bar.h"
+#include "tools/render_setup.h"
 
 namespace lumicut::tools {
 
@@ -29,14 +30,12 @@ using nlohmann::ordered_json;
 
 namespace {
 
-struct Options {
-  std::string scene, integrator = "lightcuts", output, png, stats, vpl_in, vpl_out, size, crop, layers, heat_maps,
-                     accel = "embree", rays = "robust";
-  std::vector<std::string> parameters;
+struct Options : RenderSetup {
+  Options() { integrator = "lightcuts"; }
+  std::string scene, output, png, stats, vpl_in, vpl_out, size, crop, layers, heat_maps;
   uint32_t samples = 0, squares = 0;
-  int threads = 0, verbosity = 1;
-  uint64_t seed = 0, vpls = 0;
-  bool has_seed = false, has_vpls = false, quiet = false, half = false;
+  int verbosity = 1;
+  bool quiet = false, half = false;
   float exposure = 0;
 };
 
@@ -136,11 +135,6 @@ void log_message(void* user, int32_t level, const char* text) {
   fmt::print(stderr, "lumicut: {}: {}\n", kNames[std::clamp(level, 0, 3)], text);
 }
 
-void set_parameter(const io::Api& api, lumicut_integrator integrator, const std::string& name,
-                   const std::string& value) {
-  if (api.integrator_set(integrator, name.c_str(), value.c_str()) != LUMICUT_OK) throw UsageError(api.last_error());
-}
-
 uint64_t peak_bytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
@@ -209,24 +203,11 @@ class RenderCommand {
     desc.log = log_message;
     desc.user = &bar_;
     io::check(api(), api().device_create(&desc, device_.out()), "device");
-    lumicut_scene_desc scene{};
-    scene.struct_size = sizeof(scene);
-    scene.accel = o_.accel.c_str();
-    scene.robust = o_.rays == "robust" ? 1 : 0;
-    if (api().scene_create(device_.get(), &scene, scene_.out()) != LUMICUT_OK) throw UsageError(api().last_error());
+    create_scene(api(), o_, device_.get(), scene_);
   }
 
   void create_integrator(io::Handle<lumicut_integrator>& integrator) {
-    if (api().integrator_create(device_.get(), o_.integrator.c_str(), integrator.out()) != LUMICUT_OK)
-      throw UsageError(api().last_error());
-    if (o_.has_vpls) set_parameter(api(), integrator.get(), "vpls", std::to_string(o_.vpls));
-    if (o_.has_seed) set_parameter(api(), integrator.get(), "seed", std::to_string(o_.seed));
-    for (const auto& parameter : o_.parameters) {
-      const size_t equals = parameter.find('=');
-      if (equals == std::string::npos || equals == 0)
-        throw UsageError(fmt::format("-p {}: must be name=value", parameter));
-      set_parameter(api(), integrator.get(), parameter.substr(0, equals), parameter.substr(equals + 1));
-    }
+    tools::create_integrator(api(), o_, device_.get(), integrator);
   }
 
   void create_integrator() {
@@ -468,10 +449,7 @@ void add_render(CLI::App& app) {
   auto* command = app.add_subcommand("render", "Render a scene file");
   const auto o = std::make_shared<Options>();
   command->add_option("scene", o->scene, "Scene, JSON: docs/scene_format.md")->required();
-  command->add_option("-i,--integrator", o->integrator, "How to sum the lights; `lumicut info` lists them")
-      ->capture_default_str();
-  command->add_option("-p,--parameter", o->parameters, "name=value, as `lumicut info` lists them; may be repeated")
-      ->allow_extra_args(false);
+  add_setup_options(*command, *o);
   command->add_option("-o,--output", o->output, "EXR to write");
   command->add_option("--png", o->png, "PNG to write too: exposed, cut to [0,1], sRGB");
   command
@@ -482,8 +460,6 @@ void add_render(CLI::App& app) {
       "--layers", o->layers,
       "Layers of the EXR, with commas, or `all` (default: radiance,depth,normal,albedo,cut_size,rays,bounds)");
   command->add_flag("--half", o->half, "16 bits a number in the EXR instead of 32");
-  command->add_option("--vpls", o->vpls, "Number of virtual lights; as -p vpls=N");
-  command->add_option("--seed", o->seed, "Seed of all randomness; as -p seed=N");
   command->add_option("--size", o->size, "WIDTHxHEIGHT in pixels (default: the scene's)");
   command->add_option("--spp", o->samples, "Samples a pixel (default: the scene's)")->check(CLI::Range(1, 65536));
   command->add_option("--crop", o->crop, "x0,y0,x1,y1: the part of the image to render, row 0 on top");
@@ -495,11 +471,6 @@ void add_render(CLI::App& app) {
       ->excludes("--crop");
   command->add_option("--heat-map", o->heat_maps,
                       "Folder for false-colour PNGs of what a point cost: bounds, cut_size, rays");
-  command->add_option("--threads", o->threads, "Threads; 0: all")->capture_default_str()->check(CLI::Range(0, 4096));
-  command->add_option("--accel", o->accel, "How rays are traced: embree or agglomerative")->capture_default_str();
-  command->add_option("--rays", o->rays, "robust: none slips between two triangles; fast: some may, in less time")
-      ->check(CLI::IsMember({"robust", "fast"}))
-      ->capture_default_str();
   command->add_option("--vpl-in", o->vpl_in, "Take the virtual lights from this file");
   command->add_option("--vpl-out", o->vpl_out, "Write the virtual lights to this file");
   command->add_option("--stats", o->stats, "JSON file of seconds, counts and memory to write");
@@ -510,9 +481,7 @@ void add_render(CLI::App& app) {
   command->footer(
       "Example: lumicut render bench/scenes/conference.json -i lightcuts -p error=0.02 --vpls 60000 -o out.exr --png "
       "out.png");
-  command->callback([o, command] {
-    o->has_seed = command->count("--seed") > 0;
-    o->has_vpls = command->count("--vpls") > 0;
+  command->callback([o] {
     if (o->output.empty() && o->png.empty() && o->stats.empty() && o->vpl_out.empty() && o->heat_maps.empty())
       throw UsageError("render: nothing to write; give -o out.exr, --png, --stats, --heat-map or --vpl-out");
     catch_interrupts();

@@ -1,0 +1,52 @@
+#include "tools/render_setup.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+
+#include "tools/commands.h"
+
+namespace lumicut::tools {
+
+void add_setup_options(CLI::App& command, RenderSetup& setup) {
+  command.add_option("-i,--integrator", setup.integrator, "How to sum the lights; `lumicut info` lists them")
+      ->capture_default_str();
+  command.add_option("-p,--parameter", setup.parameters, "name=value, as `lumicut info` lists them; may be repeated")
+      ->allow_extra_args(false);
+  command.add_option("--vpls", setup.vpls, "Number of virtual lights; as -p vpls=N");
+  command.add_option("--seed", setup.seed, "Seed of all randomness; as -p seed=N");
+  command.add_option("--threads", setup.threads, "Threads; 0: all")->capture_default_str()->check(CLI::Range(0, 4096));
+  command.add_option("--accel", setup.accel, "How rays are traced: embree or agglomerative")->capture_default_str();
+  command.add_option("--rays", setup.rays, "robust: none slips between two triangles; fast: some may, in less time")
+      ->check(CLI::IsMember({"robust", "fast"}))
+      ->capture_default_str();
+}
+
+void create_scene(const io::Api& api, const RenderSetup& setup, lumicut_device device,
+                  io::Handle<lumicut_scene>& scene) {
+  lumicut_scene_desc desc{};
+  desc.struct_size = sizeof(desc);
+  desc.accel = setup.accel.c_str();
+  desc.robust = setup.rays == "robust" ? 1 : 0;
+  if (api.scene_create(device, &desc, scene.out()) != LUMICUT_OK) throw UsageError(api.last_error());
+}
+
+void create_integrator(const io::Api& api, const RenderSetup& setup, lumicut_device device,
+                       io::Handle<lumicut_integrator>& integrator) {
+  if (api.integrator_create(device, setup.integrator.c_str(), integrator.out()) != LUMICUT_OK)
+    throw UsageError(api.last_error());
+  const auto set = [&](const std::string& name, const std::string& value) {
+    if (api.integrator_set(integrator.get(), name.c_str(), value.c_str()) != LUMICUT_OK)
+      throw UsageError(api.last_error());
+  };
+  if (setup.vpls) set("vpls", std::to_string(*setup.vpls));
+  if (setup.seed) set("seed", std::to_string(*setup.seed));
+  for (const auto& parameter : setup.parameters) {
+    const size_t equals = parameter.find('=');
+    if (equals == std::string::npos || equals == 0)
+      throw UsageError(fmt::format("-p {}: must be name=value", parameter));
+    set(parameter.substr(0, equals), parameter.substr(equals + 1));
+  }
+}
+
+}  // namespace lumicut::tools

@@ -1,0 +1,33 @@
+// What every command that renders asks for, and how the library is given it.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/library.h"
+
+namespace CLI {
+class App;
+}
+
+namespace lumicut::tools {
+
+struct RenderSetup {
+  std::string integrator, accel = "embree", rays = "robust";
+  std::vector<std::string> parameters;  // name=value
+  std::optional<uint64_t> vpls, seed;
+  int threads = 0;
+};
+
+// -i, -p, --vpls, --seed, --threads, --accel, --rays.
+void add_setup_options(CLI::App& command, RenderSetup& setup);
+
+// Both throw UsageError in the library's words where it refuses what the command line says.
+void create_scene(const io::Api& api, const RenderSetup& setup, lumicut_device device,
+                  io::Handle<lumicut_scene>& scene);
+void create_integrator(const io::Api& api, const RenderSetup& setup, lumicut_device device,
+                       io::Handle<lumicut_integrator>& integrator);
+
+}  // namespace lumicut::tools
