@@ -1,5 +1,7 @@
 #include "clusters/light_kernel.h"
 
+#include "scene/bsdf.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "clusters/light_kernel.cpp"
 #include "hwy/foreach_target.h"  // compiles this file once a target; before highway.h
@@ -100,10 +102,7 @@ Rgb light_point(const Vpl& light, const Rgb& intensity, float clamp2, const Surf
   }
   geometry *= std::max(0.0f, dot(point.normal, to_light));
   if (!(geometry > 0.0f)) return {};
-  Rgb f = point.diffuse;
-  const float cosine = dot(point.mirror, to_light);
-  if (cosine > 0.0f) f += point.specular * std::pow(std::min(1.0f, cosine), point.shininess);
-  return f * intensity * geometry;
+  return reflectance(point, to_light) * intensity * geometry;
 }
 
 }  // namespace lumicut
