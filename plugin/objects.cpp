@@ -164,6 +164,8 @@ void lumicut_integrator_t::prepare(lumicut_scene_t& of, Progress& progress, Stat
     next->vpls = host_lights;
   } else if (same_source && prepared->vpls_key == tracing) {
     next->vpls = prepared->vpls;
+  } else if (entry.light_source == LightSource::emitters) {
+    next->vpls = std::make_shared<VplSet>();
   } else {
     const PhaseTimer timer(into, "light paths");
     next->vpls = std::make_shared<VplSet>(trace_vpls(of.scene, vpl_options(params), progress));

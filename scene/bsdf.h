@@ -25,14 +25,17 @@ struct BsdfSample {
 class Bsdf {
  public:
   explicit Bsdf(const SurfacePoint& point) : point_(point) {
-    const float diffuse = std::numbers::pi_v<float> * luminance(point.diffuse);
-    const float specular = luminance(point.specular) * 2.0f * std::numbers::pi_v<float> / (point.shininess + 1.0f);
-    const float sum = diffuse + specular;
+    const float diffuse = std::numbers::pi_v<float> * luminance(point.diffuse), sum = luminance(albedo());
     diffuse_share_ = sum > 0.0f ? diffuse / sum : 1.0f;
     black_ = !(sum > 0.0f);
   }
 
   bool black() const { return black_; }
+  // Share of the light that the lobes send back, as if none fell below the horizon.
+  Rgb albedo() const {
+    return point_.diffuse * std::numbers::pi_v<float> +
+           point_.specular * (2.0f * std::numbers::pi_v<float> / (point_.shininess + 1.0f));
+  }
 
   float pdf(const Vec3f& direction) const {
     const float cosine = dot(point_.normal, direction);
