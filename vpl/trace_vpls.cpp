@@ -154,8 +154,9 @@ VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progr
     for (uint64_t i = 0; i < direct; ++i) {
       if (i % 4096 == 0) progress.check();
       Rng rng(options.seed, Stage::light_path, i, 1);
-      const Vpl v = emitters.sample_direct((static_cast<double>(i) + rng.next_float()) / static_cast<double>(direct),
-                                           direct, rng).vpl;
+      const Vpl v =
+          emitters.sample_direct((static_cast<double>(i) + rng.next_float()) / static_cast<double>(direct), direct, rng)
+              .vpl;
       if (max_component(v.intensity) > 0.0f && is_finite(v.intensity)) set.lights.push_back(v);
     }
     progress.advance(direct);
