@@ -19,31 +19,40 @@ std::span<const ChannelInfo> channel_table() {
       {Channel::bounds, "bounds", 1, "Error bounds evaluated, a sample"},
       {Channel::error, "error", 1,
        "Half the width of the confidence interval of the luminance, W/(sr m2); 0 before two passes"},
+      {Channel::illuminance, "illuminance", 1, "Illuminance of the side that is seen, lux; 0 unless asked for"},
   };
   return table;
 }
 
-Film::Film(Rect crop) : crop_(crop) {
+Film::Film(Rect crop, std::vector<uint32_t> groups) : crop_(crop), groups_(std::move(groups)) {
   const size_t pixels = size_t{crop.width()} * crop.height();
   for (const ChannelInfo& c : channel_table())
     planes_[static_cast<size_t>(c.channel)].assign(pixels * c.components, 0.0f);
+  group_planes_.assign(groups_.size(), std::vector<float>(3 * pixels, 0.0f));
+}
+
+template <typename Planes, typename Groups, typename Fn>
+static void for_each_plane(Planes& planes, Groups& groups, Fn&& fn) {
+  for (auto& plane : planes) fn(plane);
+  for (auto& plane : groups) fn(plane);
 }
 
 void Film::save(std::vector<uint8_t>& out) const {
-  for (const auto& plane : planes_) {
+  for_each_plane(planes_, group_planes_, [&](const std::vector<float>& plane) {
     const auto* bytes = reinterpret_cast<const uint8_t*>(plane.data());
     out.insert(out.end(), bytes, bytes + plane.size() * sizeof(float));
-  }
+  });
 }
 
 bool Film::load(std::span<const uint8_t> bytes) {
   size_t size = 0;
-  for (const auto& plane : planes_) size += plane.size() * sizeof(float);
+  for_each_plane(planes_, group_planes_,
+                 [&](const std::vector<float>& plane) { size += plane.size() * sizeof(float); });
   if (bytes.size() != size) return false;
-  for (auto& plane : planes_) {
+  for_each_plane(planes_, group_planes_, [&](std::vector<float>& plane) {
     std::memcpy(plane.data(), bytes.data(), plane.size() * sizeof(float));
     bytes = bytes.subspan(plane.size() * sizeof(float));
-  }
+  });
   return true;
 }
 

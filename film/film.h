@@ -11,7 +11,19 @@
 
 namespace lumicut {
 
-enum class Channel : uint32_t { radiance, alpha, depth, normal, albedo, position, cut_size, rays, bounds, error };
+enum class Channel : uint32_t {
+  radiance,
+  alpha,
+  depth,
+  normal,
+  albedo,
+  position,
+  cut_size,
+  rays,
+  bounds,
+  error,
+  illuminance
+};
 
 struct ChannelInfo {
   Channel channel;
@@ -31,8 +43,17 @@ struct Rect {
 
 class Film {
  public:
-  explicit Film(Rect crop);
+  // `groups`: light groups that have a plane of radiance of their own, rising.
+  explicit Film(Rect crop, std::vector<uint32_t> groups = {});
   const Rect& crop() const { return crop_; }
+  const std::vector<uint32_t>& groups() const { return groups_; }
+  // Radiance that the light of one group brings; `index` into groups().
+  float* group_pixel(size_t index, uint32_t x, uint32_t y) {
+    return const_cast<float*>(std::as_const(*this).group_pixel(index, x, y));
+  }
+  const float* group_pixel(size_t index, uint32_t x, uint32_t y) const {
+    return group_planes_[index].data() + 3 * (static_cast<size_t>(y - crop_.y0) * crop_.width() + (x - crop_.x0));
+  }
   // Pixel in image coordinates; components as in channel_table.
   float* pixel(Channel channel, uint32_t x, uint32_t y) {
     return const_cast<float*>(std::as_const(*this).pixel(channel, x, y));
@@ -55,7 +76,9 @@ class Film {
 
  private:
   Rect crop_;
-  std::vector<float> planes_[10];
+  std::vector<float> planes_[11];
+  std::vector<uint32_t> groups_;
+  std::vector<std::vector<float>> group_planes_;
 };
 
 }  // namespace lumicut

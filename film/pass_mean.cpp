@@ -27,6 +27,11 @@ void PassMean::add(const Film& pass, const Rect& rect, uint64_t passes, Film& me
       s.mean += away / n;
       s.squares += away * (value - s.mean);
       for (int k = 0; k < 3; ++k) s.radiance[k] += radiance[k];
+      for (size_t g = 0; g < mean.groups().size(); ++g) {
+        const float* in = pass.group_pixel(g, x, y);
+        float* out = mean.group_pixel(g, x, y);
+        for (int k = 0; k < 3; ++k) out[k] += (in[k] - out[k]) * share;
+      }
       for (const ChannelInfo& c : channel_table()) {
         float* out = mean.pixel(c.channel, x, y);
         if (c.channel == Channel::radiance) {

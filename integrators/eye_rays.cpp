@@ -22,13 +22,12 @@ Rng EyeRays::rng_of(const SurfacePoint& point, uint32_t level) const {
   return {hash64(seed_, level), Stage::eye_ray, word(at.x, at.y), word(at.z, point.normal.x + point.mirror.x)};
 }
 
-void EyeRays::near_lamps(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, std::vector<Rgb>& light,
-                         std::vector<uint32_t>& pixels) const {
+void EyeRays::near_lamps(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, EyeHits& hits) const {
   lamps_.for_each_share(point, rng, [&](const Vpl& vpl, const Rgb& lost) {
     Ray ray;
     ray.org = point.position, ray.dir = vpl.position - point.position;
     ray.tnear = 0.0f, ray.tfar = 1.0f;
-    shadows.push_back(ray), light.push_back(lost), pixels.push_back(point.pixel);
+    shadows.push_back(ray), hits.add(lost, point.pixel, vpl.group);
   });
 }
 
@@ -43,7 +42,7 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
   for (size_t i = 0; i < points.size(); ++i) {
     const SurfacePoint point = points.get(i);
     Rng rng = rng_of(point, level);
-    if (!lamps_.empty()) near_lamps(point, rng, shadows, hits.light, hits.pixel);
+    if (!lamps_.empty()) near_lamps(point, rng, shadows, hits);
     const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float();
     const BsdfSample s = Bsdf(point).sample(choice, u, v);
     if (!(s.pdf > 0.0f) || !is_finite(s.weight)) continue;
@@ -65,8 +64,8 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
           rays[i].ray.org, rays[i].ray.dir, std::min(rays[i].ray.tfar, distance_), [&](const LampSurfaces::Hit& lamp) {
             const float share = lamp.t / distance_;
             const double density = double{lamp.t} * lamp.t / (double{lamp.cosine} * lamp.area);
-            hits.light.push_back(weights[i] * lamp.radiance * ((1.0f - share * share) * mis_weight(pdfs[i], density)));
-            hits.pixel.push_back(pixels[i]);
+            hits.add(weights[i] * lamp.radiance * ((1.0f - share * share) * mis_weight(pdfs[i], density)), pixels[i],
+                     scene_.lights()[lamp.lamp].group);
           });
     // A ray that meets its own surface at once left it below the horizon of the triangle.
     if (rays[i].hit.geom == kNoId || rays[i].ray.tfar < 4.0f * scene_.epsilon()) continue;
@@ -76,7 +75,7 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
     if (lost > 0.0f) {
       const Rgb emitted = scene_.emitted(surface, to_viewer);
       if (max_component(emitted) > 0.0f)
-        hits.light.push_back(emitted * weights[i] * lost), hits.pixel.push_back(pixels[i]);
+        hits.add(emitted * weights[i] * lost, pixels[i], scene_.meshes()[surface.mesh].group);
     }
     SurfacePoint point = scene_.shade_point(surface, to_viewer, pixels[i]);
     point.diffuse = point.diffuse * lost;

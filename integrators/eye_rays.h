@@ -15,8 +15,11 @@ namespace lumicut {
 // Points that rays found, with what they show already multiplied in: their radiance adds to their pixels.
 struct EyeHits {
   ShadePoints points;
-  std::vector<Rgb> light;       // emitted towards the ray
-  std::vector<uint32_t> pixel;  // of each entry of `light`
+  std::vector<Rgb> light;              // emitted towards the ray
+  std::vector<uint32_t> pixel, group;  // of each entry of `light`
+  void add(const Rgb& radiance, uint32_t at, uint32_t of_group) {
+    light.push_back(radiance), pixel.push_back(at), group.push_back(of_group);
+  }
 };
 
 class EyeRays {
@@ -30,8 +33,7 @@ class EyeRays {
 
  private:
   Rng rng_of(const SurfacePoint& point, uint32_t level) const;
-  void near_lamps(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, std::vector<Rgb>& light,
-                  std::vector<uint32_t>& pixels) const;
+  void near_lamps(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, EyeHits& hits) const;
 
   const Scene& scene_;
   const float distance_;

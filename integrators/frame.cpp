@@ -1,6 +1,8 @@
 #include "integrators/frame.h"
 
+#include <numbers>
 #include <optional>
+#include <set>
 
 #include "core/parallel.h"
 #include "core/rng.h"
@@ -25,15 +27,21 @@ Vec2f r2(uint32_t i, Vec2f shift) {
   return {static_cast<float>(x - std::floor(x)), static_cast<float>(y - std::floor(y))};
 }
 
+// Of radiation weighted by luminance, by convention: what 555 nm has. [docs/units.md]
+constexpr float kLumenPerWatt = 683.0f;
+
 struct PixelSums {
-  Rgb radiance{}, normal{}, albedo{};
+  std::vector<std::pair<uint32_t, Rgb>> seen;  // emitted towards the camera, by light group
+  Vec3f normal{};
+  Rgb albedo{};
   Vec3f position{};
   float depth = 0.0f, hits = 0.0f;
 };
 
 class Batch {
  public:
-  Batch(const Scene& scene, const FrameOptions& options) : scene_(scene), options_(options) {}
+  Batch(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options)
+      : scene_(scene), methods_(methods), options_(options) {}
 
   void add_tile(const Rect& tile) {
     tiles_.push_back(tile);
@@ -71,22 +79,26 @@ class Batch {
   }
 
   // The points of the camera, and those that rays from them find.
-  void shade(const Integrator& integrator, const EyeRays* eye_rays, ShadeContext context) {
-    light_.assign(pixels_.size(), {});
+  void shade(const EyeRays* eye_rays, ShadeContext context) {
+    light_.assign(methods_.size(), std::vector<Rgb>(pixels_.size()));
     counts_.assign(pixels_.size(), {});
-    add_light(integrator, points_, context);
-    if (eye_rays == nullptr) return;
-    EyeHits hits;
-    const ShadePoints* points = &points_;
-    for (uint32_t level = 1; level <= kMaxLevels && points->size() > 0; ++level) {
-      context.progress.check();
-      Counters counters;
-      hits = eye_rays->trace(*points, level, counters);
-      context.stats.add(counters);
-      for (size_t i = 0; i < hits.light.size(); ++i) light_[hits.pixel[i]] += hits.light[i];
-      add_light(integrator, hits.points, context);
-      points = &hits.points;
+    shade_levels(points_, eye_rays, light_, context);
+    if (!options_.illuminance) return;
+    // White Lambert surfaces show the irradiance over π.
+    ShadePoints white;
+    white.reserve(points_.size());
+    for (size_t i = 0; i < points_.size(); ++i) {
+      SurfacePoint point = points_.get(i);
+      point.diffuse = Rgb{1, 1, 1} * std::numbers::inv_pi_v<float>, point.specular = {}, point.shininess = 0.0f;
+      white.push(point);
     }
+    white.finish();
+    std::vector<std::vector<Rgb>> shown(methods_.size(), std::vector<Rgb>(pixels_.size()));
+    shade_levels(white, eye_rays, shown, context);
+    illuminance_.assign(pixels_.size(), 0.0f);
+    for (const auto& of_group : shown)
+      for (size_t p = 0; p < pixels_.size(); ++p)
+        illuminance_[p] += kLumenPerWatt * std::numbers::pi_v<float> * luminance(of_group[p]);
   }
 
   void write(Film& film) const {
@@ -94,7 +106,17 @@ class Batch {
     for (size_t p = 0; p < pixels_.size(); ++p) {
       const auto [x, y] = pixels_[p];
       const PixelSums& s = sums_[p];
-      film.set(Channel::radiance, x, y, (s.radiance + light_[p]) * scale);
+      Rgb all{};
+      for (size_t g = 0; g < methods_.size(); ++g) all += light_[g][p];
+      for (const auto& [group, radiance] : s.seen) all += radiance;
+      film.set(Channel::radiance, x, y, all * scale);
+      for (size_t g = 0; g < film.groups().size(); ++g) {
+        Rgb of_group = light_[g][p];
+        for (const auto& [group, radiance] : s.seen)
+          if (group == methods_[g].group) of_group += radiance;
+        std::copy_n(&(of_group *= scale).x, 3, film.group_pixel(g, x, y));
+      }
+      if (options_.illuminance) film.set(Channel::illuminance, x, y, s.hits > 0.0f ? illuminance_[p] / s.hits : 0.0f);
       film.set(Channel::alpha, x, y, s.hits * scale);
       film.set(Channel::depth, x, y, s.depth);
       film.set(Channel::normal, x, y, normalize(s.normal));
@@ -113,16 +135,43 @@ class Batch {
   // Chance ends chains long before.
   static constexpr uint32_t kMaxLevels = 64;
 
-  void add_light(const Integrator& integrator, const ShadePoints& points, ShadeContext context) {
+  void shade_levels(const ShadePoints& first, const EyeRays* eye_rays, std::vector<std::vector<Rgb>>& light,
+                    ShadeContext context) {
+    add_light(first, light, context);
+    if (eye_rays == nullptr) return;
+    EyeHits hits;
+    const ShadePoints* points = &first;
+    for (uint32_t level = 1; level <= kMaxLevels && points->size() > 0; ++level) {
+      context.progress.check();
+      Counters counters;
+      hits = eye_rays->trace(*points, level, counters);
+      context.stats.add(counters);
+      for (size_t i = 0; i < hits.light.size(); ++i) light[slot(hits.group[i])][hits.pixel[i]] += hits.light[i];
+      add_light(hits.points, light, context);
+      points = &hits.points;
+    }
+  }
+
+  size_t slot(uint32_t group) const {
+    if (methods_.size() == 1) return 0;
+    size_t g = 0;
+    while (g + 1 < methods_.size() && methods_[g].group != group) ++g;
+    return g;
+  }
+
+  void add_light(const ShadePoints& points, std::vector<std::vector<Rgb>>& light, ShadeContext context) {
     if (points.size() == 0) return;
     std::vector<Rgb> radiance(points.size());
     std::vector<PointCounts> counts(points.size());
-    integrator.shade(points, radiance, counts, context);
-    for (size_t i = 0; i < points.size(); ++i) {
-      const uint32_t p = points.pixel[i];
-      light_[p] += radiance[i];
-      counts_[p] += Vec3f{static_cast<float>(counts[i].clusters), static_cast<float>(counts[i].rays),
-                          static_cast<float>(counts[i].bounds)};
+    for (size_t g = 0; g < methods_.size(); ++g) {
+      if (methods_[g].method == nullptr) continue;
+      methods_[g].method->shade(points, radiance, counts, context);
+      for (size_t i = 0; i < points.size(); ++i) {
+        const uint32_t p = points.pixel[i];
+        light[g][p] += radiance[i];
+        counts_[p] += Vec3f{static_cast<float>(counts[i].clusters), static_cast<float>(counts[i].rays),
+                            static_cast<float>(counts[i].bounds)};
+      }
     }
   }
 
@@ -143,17 +192,27 @@ class Batch {
     }
   }
 
+  static void see(PixelSums& sum, uint32_t group, const Rgb& radiance) {
+    if (!(max_component(radiance) > 0.0f)) return;
+    for (auto& [of, light] : sum.seen)
+      if (of == group) {
+        light += radiance;
+        return;
+      }
+    sum.seen.emplace_back(group, radiance);
+  }
+
   // What the ray found, into the sums of pixel p; false: nothing to shade.
   bool first_hit(const RayHit& ray, size_t p, float cosine, SurfacePoint& point) {
     const Vec3f to_viewer = -ray.ray.dir;
     PixelSums& sum = sums_[p];
     if (ray.hit.geom == kNoId) {
-      if (!scene_.environment().hidden) sum.radiance += scene_.environment_radiance(ray.ray.dir);
+      if (!scene_.environment().hidden) see(sum, scene_.environment().group, scene_.environment_radiance(ray.ray.dir));
       return false;
     }
     const SurfaceHit surface = scene_.surface(ray);
     point = scene_.shade_point(surface, to_viewer, static_cast<uint32_t>(p));
-    sum.radiance += scene_.emitted(surface, to_viewer);
+    see(sum, scene_.meshes()[surface.mesh].group, scene_.emitted(surface, to_viewer));
     sum.normal += point.normal;
     sum.albedo +=
         min(scene_.diffuse_color(surface.material, surface.uv) + scene_.specular_color(surface.material, surface.uv),
@@ -167,13 +226,15 @@ class Batch {
     uint32_t x, y;
   };
   const Scene& scene_;
+  const std::span<const GroupMethod> methods_;
   const FrameOptions& options_;
   std::vector<Rect> tiles_;
   std::vector<Pixel> pixels_;
   std::vector<PixelSums> sums_;
   ShadePoints points_;
-  std::vector<Rgb> light_;     // reflected, summed over a pixel's samples
-  std::vector<Vec3f> counts_;  // clusters, rays, bounds
+  std::vector<std::vector<Rgb>> light_;  // of each method: reflected, summed over a pixel's samples
+  std::vector<float> illuminance_;       // summed over a pixel's samples
+  std::vector<Vec3f> counts_;            // clusters, rays, bounds
 };
 
 }  // namespace
@@ -187,14 +248,36 @@ std::vector<Rect> frame_tiles(const FrameOptions& options) {
   return tiles;
 }
 
+std::vector<uint32_t> light_groups(const Scene& scene) {
+  std::set<uint32_t> groups;
+  for (const Light& l : scene.lights()) groups.insert(l.group);
+  if (!scene.environment().black()) groups.insert(scene.environment().group);
+  for (const Mesh& m : scene.meshes()) {
+    const auto emits = [&](uint32_t material) { return scene.materials()[material].emissive(); };
+    if (m.triangle_materials.empty() ? m.triangle_count() > 0 && emits(m.material)
+                                     : std::any_of(m.triangle_materials.begin(), m.triangle_materials.end(), emits))
+      groups.insert(m.group);
+  }
+  return {groups.begin(), groups.end()};
+}
+
 void render_frame(const Scene& scene, const Integrator& integrator, const FrameOptions& options, Film& film,
                   ShadeContext context, const std::function<void(const Rect&)>& tile_done) {
+  const GroupMethod all{0, &integrator};
+  render_frame(scene, {&all, 1}, options, film, context, tile_done);
+}
+
+void render_frame(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options, Film& film,
+                  ShadeContext context, const std::function<void(const Rect&)>& tile_done) {
   const std::vector<Rect> tiles = frame_tiles(options);
+  size_t batch_size = 1;
+  for (const GroupMethod& m : methods)
+    if (m.method != nullptr) batch_size = std::max(batch_size, m.method->batch_size());
   // Batches hold consecutive tiles, and depend on the integrator's wish alone: never on the number of threads.
   std::vector<std::pair<size_t, size_t>> batches;
   for (size_t first = 0; first < tiles.size();) {
     size_t last = first, points = 0;
-    while (last < tiles.size() && (last == first || points < integrator.batch_size())) {
+    while (last < tiles.size() && (last == first || points < batch_size)) {
       points += size_t{tiles[last].width()} * tiles[last].height() * options.samples;
       ++last;
     }
@@ -209,10 +292,10 @@ void render_frame(const Scene& scene, const Integrator& integrator, const FrameO
       [&](const tbb::blocked_range<size_t>& range) {
         for (size_t b = range.begin(); b < range.end(); ++b) {
           context.progress.check();
-          Batch batch(scene, options);
+          Batch batch(scene, methods, options);
           for (size_t t = batches[b].first; t < batches[b].second; ++t) batch.add_tile(tiles[t]);
           batch.collect();
-          batch.shade(integrator, eye_rays ? &*eye_rays : nullptr, context);
+          batch.shade(eye_rays ? &*eye_rays : nullptr, context);
           context.progress.check();
           batch.write(film);
           context.progress.advance(batch.pixel_count());

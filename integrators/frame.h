@@ -12,15 +12,29 @@ struct FrameOptions {
   uint32_t width = 0, height = 0, samples = 1, tile_size = 64;
   Rect crop;  // inside width × height
   uint64_t seed = 1;
-  float compensate = 0.0f;  // distance of the clamp whose loss rays bring back; 0: none [integrators/eye_rays.h]
-  bool jitter = false;      // a single sample too lies at random in its pixel
+  float compensate = 0.0f;   // distance of the clamp whose loss rays bring back; 0: none [integrators/eye_rays.h]
+  bool jitter = false;       // a single sample too lies at random in its pixel
+  bool illuminance = false;  // fill that channel: about as long again
 };
 
 // Tiles of the crop in the order they are rendered.
 std::vector<Rect> frame_tiles(const FrameOptions& options);
 
-// Renders into `film` (whose crop is options.crop). `tile_done` is called from any thread, once a tile, after its
-// pixels are written. Throws Error(cancelled).
+// What renders the light of one group.
+struct GroupMethod {
+  uint32_t group;
+  const Integrator* method;  // null: the group has no virtual lights
+};
+
+// Light groups that something of the scene belongs to that emits, rising.
+std::vector<uint32_t> light_groups(const Scene& scene);
+
+// Renders into `film`, whose groups are those of `methods`, or none where there is one method for all light.
+void render_frame(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options, Film& film,
+                  ShadeContext context, const std::function<void(const Rect&)>& tile_done);
+
+// The same with one method. Renders into `film` (whose crop is options.crop). `tile_done` is called from any thread,
+// once a tile, after its pixels are written. Throws Error(cancelled).
 void render_frame(const Scene& scene, const Integrator& integrator, const FrameOptions& options, Film& film,
                   ShadeContext context, const std::function<void(const Rect&)>& tile_done);
 

@@ -18,6 +18,14 @@ const ChannelInfo& channel_named(const char* name) {
   fail_argument(std::string("lumicut_render_read: channel \"") + name + "\" is not known; there are: " + known);
 }
 
+// Index of the group whose channel that is; none: no such channel.
+std::optional<size_t> group_named(const char* name, const std::vector<uint32_t>& groups) {
+  if (name == nullptr) return std::nullopt;
+  for (size_t g = 0; g < groups.size(); ++g)
+    if (name == "radiance." + number_text(uint64_t{groups[g]})) return g;
+  return std::nullopt;
+}
+
 }  // namespace
 
 lumicut_result lumicut_get_channel_info(uint32_t index, lumicut_channel_info* info) {
@@ -65,7 +73,8 @@ lumicut_result lumicut_render_next_tile(lumicut_render render, lumicut_tile* til
 lumicut_result lumicut_render_read(lumicut_render render, const char* channel, const lumicut_tile* rect, float* out) {
   return guard([&] {
     lumicut_render_t& r = object(render);
-    const ChannelInfo& c = channel_named(channel);
+    const std::optional<size_t> group = group_named(channel, r.groups());
+    if (!group) channel_named(channel);
     if (out == nullptr) fail_argument("lumicut_render_read: out is NULL");
     const Rect& crop = r.options.crop;
     Rect part = crop;
@@ -78,7 +87,18 @@ lumicut_result lumicut_render_read(lumicut_render render, const char* channel, c
       fail_argument("lumicut_tile: (" + number_text(uint64_t{part.x0}) + ", " + number_text(uint64_t{part.y0}) + ", " +
                     number_text(uint64_t{part.x1}) + ", " + number_text(uint64_t{part.y1}) +
                     ") is not a rectangle inside the crop");
-    r.read(c, part, out);
+    if (group)
+      r.read_group(*group, part, out);
+    else
+      r.read(channel_named(channel), part, out);
+  });
+}
+
+lumicut_result lumicut_render_groups(lumicut_render render, const uint32_t** groups, uint64_t* count) {
+  return guard([&] {
+    const lumicut_render_t& r = object(render);
+    if (groups == nullptr || count == nullptr) fail_argument("lumicut_render_groups: groups or count is NULL");
+    *groups = r.groups().data(), *count = r.groups().size();
   });
 }
 

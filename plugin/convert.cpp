@@ -371,6 +371,7 @@ FrameOptions to_frame_options(const lumicut_render_desc& in) {
   FrameOptions o;
   o.width = in.width, o.height = in.height;
   o.samples = in.samples == 0 ? 1 : in.samples;
+  o.illuminance = (in.flags & LUMICUT_ILLUMINANCE) != 0;
   // A batch holds at least a tile's samples: tiles shrink rather than let memory grow with the samples.
   const auto tile_points = [&] { return uint64_t{o.tile_size} * o.tile_size * o.samples; };
   o.tile_size = in.tile_size == 0 ? 64 : in.tile_size;
@@ -402,13 +403,14 @@ PassOptions to_pass_options(const lumicut_render_desc& in) {
   c.not_negative("max_seconds", in.max_seconds);
   c.range("target_error", in.target_error, 0.0f, 1e6f);
   c.range("confidence", in.confidence, 0.0f, 0.999999f);
-  c.flags("flags", in.flags, LUMICUT_CHECKPOINTS);
+  c.flags("flags", in.flags, LUMICUT_CHECKPOINTS | LUMICUT_ILLUMINANCE | LUMICUT_GROUPS);
   if (in.checkpoint == nullptr && in.checkpoint_size != 0)
     c.fail("checkpoint", "is NULL, but checkpoint_size is " + number_text(in.checkpoint_size));
   PassOptions o;
   o.max_seconds = in.max_seconds, o.target_error = in.target_error;
   o.confidence = in.confidence > 0.0f ? in.confidence : 0.95;
   o.passes = in.passes > 0 ? in.passes : (in.max_seconds > 0.0f || in.target_error > 0.0f ? 0 : 1);
+  o.groups = (in.flags & LUMICUT_GROUPS) != 0;
   o.checkpoints = (in.flags & LUMICUT_CHECKPOINTS) != 0;
   if (in.checkpoint != nullptr) {
     const auto* bytes = static_cast<const uint8_t*>(in.checkpoint);

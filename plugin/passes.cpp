@@ -80,9 +80,9 @@ uint32_t load_passes(const std::vector<uint8_t>& bytes, uint64_t key, PassMean& 
 uint64_t passes_key(const Scene& scene, const std::string& integrator, const std::string& params,
                     const FrameOptions& frame, double confidence) {
   std::string text = integrator + "\n" + params;
-  for (const uint64_t v :
-       {uint64_t{frame.width}, uint64_t{frame.height}, uint64_t{frame.samples}, uint64_t{frame.tile_size},
-        uint64_t{frame.crop.x0}, uint64_t{frame.crop.y0}, uint64_t{frame.crop.x1}, uint64_t{frame.crop.y1}})
+  for (const uint64_t v : {uint64_t{frame.width}, uint64_t{frame.height}, uint64_t{frame.samples},
+                           uint64_t{frame.tile_size}, uint64_t{frame.crop.x0}, uint64_t{frame.crop.y0},
+                           uint64_t{frame.crop.x1}, uint64_t{frame.crop.y1}, uint64_t{frame.illuminance}})
     text += number_text(v) + "\n";
   text += number_text(confidence);
   return hash_bytes(scene_hash(scene), text.data(), text.size());

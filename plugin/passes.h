@@ -16,7 +16,7 @@ namespace lumicut {
 struct PassOptions {
   uint32_t passes = 1;  // 0: until stopped
   double max_seconds = 0.0, target_error = 0.0, confidence = 0.95;
-  bool checkpoints = false;
+  bool checkpoints = false, groups = false;
   std::vector<uint8_t> resume;
   bool progressive() const { return passes != 1 || checkpoints || !resume.empty(); }
 };

@@ -7,6 +7,7 @@
 using namespace lumicut;
 
 namespace {
+constexpr size_t kMaxGroups = 256;
 uint32_t tiles_across(uint32_t length, uint32_t tile) { return (length + tile - 1) / tile; }
 }  // namespace
 
@@ -23,12 +24,19 @@ lumicut_render_t::lumicut_render_t(lumicut_integrator_t& integrator, lumicut_sce
   using_integrator_ = integrator.gate.change("a render");
   using_scene_ = scene.gate.read("a render");
   scene.require_committed();
+  if (passes_.groups) film_ = Film(o.crop, light_groups(scene.scene));
   if (!scene.scene.has_camera()) fail_state("lumicut_scene: it has no camera");
   if (scene.device.get() != integrator.device.get())
     fail_argument("lumicut_scene: it belongs to another device than the integrator");
   if (integrator.host_lights != nullptr && integrator.params.boolean("compensate"))
     fail_argument(
         "parameter compensate: only lights that the library traced can be compensated, and the host set its own");
+  if (passes_.groups && integrator.entry.light_source == LightSource::emitters)
+    fail_argument(std::string("lumicut_render_desc.flags: ") + integrator.entry.id +
+                  " has no virtual lights, so LUMICUT_GROUPS means nothing to it");
+  if (film_.groups().size() > kMaxGroups)
+    fail_argument("lumicut_render_desc.flags: LUMICUT_GROUPS with " + number_text(uint64_t{film_.groups().size()}) +
+                  " light groups; at most " + number_text(uint64_t{kMaxGroups}) + " can be told apart in one render");
   progress_ = work.begin();
   thread_ = std::thread([this] { run(); });
 }
@@ -67,6 +75,27 @@ FrameOptions lumicut_render_t::frame_options(const Prepared& prepared) const {
   return frame;
 }
 
+std::vector<GroupMethod> lumicut_render_t::methods(const Prepared& prepared, std::vector<OfGroup>& of_groups) {
+  if (!passes_.groups || film_.groups().empty()) return {{0, prepared.method.get()}};
+  of_groups.clear();
+  of_groups.resize(film_.groups().size());
+  for (const Vpl& v : prepared.standing_off.lights) {
+    const auto at = std::lower_bound(film_.groups().begin(), film_.groups().end(), v.group);
+    if (at != film_.groups().end() && *at == v.group)
+      of_groups[static_cast<size_t>(at - film_.groups().begin())].lights.lights.push_back(v);
+  }
+  std::vector<GroupMethod> all;
+  for (size_t g = 0; g < of_groups.size(); ++g) {
+    progress_->check();
+    if (!of_groups[g].lights.lights.empty()) {
+      of_groups[g].method = integrator_->entry.create();
+      of_groups[g].method->prepare(scene_->scene, of_groups[g].lights, *prepared.params, {*progress_, stats});
+    }
+    all.push_back({film_.groups()[g], of_groups[g].method.get()});
+  }
+  return all;
+}
+
 void lumicut_render_t::render() {
   stats.set_value("start_bytes", static_cast<double>(resident_memory()));
   progress_->check();
@@ -75,7 +104,8 @@ void lumicut_render_t::render() {
   const Prepared& prepared = *integrator_->prepared;
   {
     const PhaseTimer timer(stats, "render");
-    render_frame(scene_->scene, *prepared.method, frame_options(prepared), film_, {*progress_, stats},
+    std::vector<OfGroup> of_groups;
+    render_frame(scene_->scene, methods(prepared, of_groups), frame_options(prepared), film_, {*progress_, stats},
                  [this](const Rect& tile) { tile_done(tile); });
   }
   progress_->check();
@@ -110,7 +140,8 @@ void lumicut_render_t::render_passes() {
     for (uint32_t row = 0; row < rows_; ++row)
       for (uint32_t column = 0; column < columns_; ++column) tile_done(tile_rect(column, row));
   }
-  Film pass(options.crop);
+  Film pass(options.crop, film_.groups());
+  std::vector<OfGroup> of_groups;
   while (done == 0 || !enough_passes(passes_, done, work.seconds(), last_seconds, error)) {
     const double start = work.seconds();
     integrator_->prepare(*scene_, params_of_pass(integrator_->params, done, scene_->scene), *progress_, stats);
@@ -119,13 +150,14 @@ void lumicut_render_t::render_passes() {
     frame.jitter = true;
     {
       const PhaseTimer timer(stats, "render");
-      render_frame(scene_->scene, *prepared.method, frame, pass, {*progress_, stats}, [&](const Rect& tile) {
-        {
-          const std::lock_guard lock(film_mutex_);
-          mean.add(pass, tile, uint64_t{done} + 1, film_);
-        }
-        tile_done(tile);
-      });
+      render_frame(scene_->scene, methods(prepared, of_groups), frame, pass, {*progress_, stats},
+                   [&](const Rect& tile) {
+                     {
+                       const std::lock_guard lock(film_mutex_);
+                       mean.add(pass, tile, uint64_t{done} + 1, film_);
+                     }
+                     tile_done(tile);
+                   });
     }
     progress_->check();
     ++done;
@@ -186,8 +218,8 @@ Rect lumicut_render_t::next_tile() {
   return tile;
 }
 
-void lumicut_render_t::read(const ChannelInfo& channel, const Rect& rect, float* out) {
-  const size_t components = channel.components;
+void lumicut_render_t::read_plane(const Rect& rect, size_t components, float* out,
+                                  const std::function<const float*(uint32_t, uint32_t)>& pixel) {
   std::fill(out, out + size_t{rect.width()} * rect.height() * components, 0.0f);
   std::unique_lock lock(film_mutex_, std::defer_lock);
   if (passes_.progressive()) lock.lock();
@@ -199,7 +231,7 @@ void lumicut_render_t::read(const ChannelInfo& channel, const Rect& rect, float*
       const Rect tile = tile_rect(column, row);
       const uint32_t x0 = std::max(tile.x0, rect.x0), x1 = std::min(tile.x1, rect.x1);
       for (uint32_t y = std::max(tile.y0, rect.y0); y < std::min(tile.y1, rect.y1); ++y)
-        std::memcpy(out + (size_t{y - rect.y0} * rect.width() + (x0 - rect.x0)) * components,
-                    film_.pixel(channel.channel, x0, y), (x1 - x0) * components * sizeof(float));
+        std::memcpy(out + (size_t{y - rect.y0} * rect.width() + (x0 - rect.x0)) * components, pixel(x0, y),
+                    (x1 - x0) * components * sizeof(float));
     }
 }

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <deque>
+#include <functional>
 #include <limits>
 #include <thread>
 
@@ -29,7 +30,15 @@ struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
   // State after the last whole pass; stays until the next call.
   const std::vector<uint8_t>& checkpoint();
   // Tiles that are not done yet read as 0.
-  void read(const lumicut::ChannelInfo& channel, const lumicut::Rect& rect, float* out);
+  void read(const lumicut::ChannelInfo& channel, const lumicut::Rect& rect, float* out) {
+    read_plane(rect, channel.components, out,
+               [&](uint32_t x, uint32_t y) { return film_.pixel(channel.channel, x, y); });
+  }
+  // The same of one light group; `index` into groups().
+  void read_group(size_t index, const lumicut::Rect& rect, float* out) {
+    read_plane(rect, 3, out, [&](uint32_t x, uint32_t y) { return film_.group_pixel(index, x, y); });
+  }
+  const std::vector<uint32_t>& groups() const { return film_.groups(); }
 
   lumicut::Work work;
   lumicut::Stats stats;
@@ -38,9 +47,17 @@ struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
 
  private:
   void run() noexcept;
+  void read_plane(const lumicut::Rect& rect, size_t components, float* out,
+                  const std::function<const float*(uint32_t, uint32_t)>& pixel);
   void render();
   void render_passes();
   lumicut::FrameOptions frame_options(const lumicut::Prepared& prepared) const;
+  // What renders: the method as it was prepared, or one for the lights of each group.
+  struct OfGroup {
+    lumicut::VplSet lights;
+    std::unique_ptr<lumicut::Integrator> method;
+  };
+  std::vector<lumicut::GroupMethod> methods(const lumicut::Prepared& prepared, std::vector<OfGroup>& of_groups);
   void tile_done(const lumicut::Rect& tile);
   lumicut::Rect tile_rect(uint32_t column, uint32_t row) const;
 

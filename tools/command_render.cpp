@@ -36,7 +36,7 @@ struct Options : RenderSetup {
   uint32_t samples = 0, squares = 0, passes = 0;
   double seconds = 0, target_error = 0, confidence = 0;
   int verbosity = 1;
-  bool quiet = false, half = false, resume = false;
+  bool quiet = false, half = false, resume = false, groups = false;
   float exposure = 0;
 };
 
@@ -239,6 +239,9 @@ class RenderCommand {
     desc_.target_error = static_cast<float>(o_.target_error);
     desc_.confidence = static_cast<float>(o_.confidence);
     if (!o_.checkpoint.empty()) desc_.flags |= LUMICUT_CHECKPOINTS;
+    if (o_.groups) desc_.flags |= LUMICUT_GROUPS;
+    for (const auto& channel : choose_channels(api(), o_.layers))
+      if (channel.name == "illuminance" && o_.layers != "all") desc_.flags |= LUMICUT_ILLUMINANCE;
     if (o_.resume && std::filesystem::exists(o_.checkpoint)) {
       resumed_ = io::read_whole_file(o_.checkpoint);
       desc_.checkpoint = resumed_.data(), desc_.checkpoint_size = resumed_.size();
@@ -410,6 +413,11 @@ class RenderCommand {
 
     if (!o_.output.empty()) {
       for (const auto& channel : channels) image.layers.push_back(read(channel));
+      const uint32_t* groups = nullptr;
+      uint64_t group_count = 0;
+      io::check(api(), api().render_groups(parts_[0].second.get(), &groups, &group_count), "light groups");
+      for (uint64_t g = 0; g < group_count; ++g)
+        image.layers.push_back(read({fmt::format("radiance.{}", groups[g]), 3}));
       for (const char* key : {"scene", "integrator", "version", "vpls", "seed", "samples"})
         image.attributes[key] = stats[key].is_string() ? stats[key].get<std::string>() : stats[key].dump();
       image.attributes["parameters"] = stats["parameters"].dump();
@@ -525,6 +533,9 @@ void add_render(CLI::App& app) {
   auto* checkpoint =
       command->add_option("--checkpoint", o->checkpoint, "File that a stopped or killed render goes on from");
   command->add_flag("--resume", o->resume, "Go on from --checkpoint, if it is there")->needs(checkpoint);
+  command->add_flag(
+      "--groups", o->groups,
+      "One image for each light group too, as layers radiance.GROUP: `lumicut mix` puts them together anew");
   command->add_option("--heat-map", o->heat_maps,
                       "Folder for false-colour PNGs of what a point cost: bounds, cut_size, rays");
   command->add_option("--vpl-in", o->vpl_in, "Take the virtual lights from this file");

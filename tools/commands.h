@@ -47,6 +47,7 @@ inline void stop_if_interrupted() {
 void add_render(CLI::App& app);
 void add_flythrough(CLI::App& app);
 void add_compare(CLI::App& app);
+void add_mix(CLI::App& app);
 void add_bench(CLI::App& app);
 void add_report(CLI::App& app);
 void add_info(CLI::App& app);

@@ -324,12 +324,13 @@ typedef struct lumicut_render_desc {
   float max_seconds;  /* stop after the pass that comes nearest to this; 0: never */
   float target_error; /* stop after at least 8 passes, when lumicut_status.error is at most this; 0: never */
   float confidence;   /* of the interval in the channel `error`; 0: 0.95 */
-  uint32_t flags;     /* LUMICUT_CHECKPOINTS: keep what lumicut_render_checkpoint shows */
+  uint32_t flags;     /* LUMICUT_CHECKPOINTS: keep what lumicut_render_checkpoint shows; LUMICUT_ILLUMINANCE: fill that
+                         channel; LUMICUT_GROUPS: one image for each light group too, in channels "radiance.GROUP" */
   const void* checkpoint; /* go on from there: scene, integrator, parameters and the fields above but the stops must be the
                              same, and so is the image, bit for bit. NULL: begin */
   uint64_t checkpoint_size;
 } lumicut_render_desc;
-enum { LUMICUT_CHECKPOINTS = 1 };
+enum { LUMICUT_CHECKPOINTS = 1, LUMICUT_ILLUMINANCE = 2, LUMICUT_GROUPS = 4 };
 
 typedef struct lumicut_tile {
   uint32_t struct_size;
@@ -348,6 +349,8 @@ LUMICUT_API lumicut_result lumicut_render_start(lumicut_integrator integrator, l
 LUMICUT_API lumicut_result lumicut_render_wait(lumicut_render render, uint32_t milliseconds, lumicut_status* status); /* [any] returns when done or after that time (0: at once, LUMICUT_FOREVER); a failed render's error comes back here. status may be NULL */
 LUMICUT_API lumicut_result lumicut_render_next_tile(lumicut_render render, lumicut_tile* tile); /* [object] finished tiles, each once; x1 = 0: none now */
 LUMICUT_API lumicut_result lumicut_render_read(lumicut_render render, const char* channel, const lumicut_tile* rect, float* out); /* [any] rect NULL: the crop; rows packed from the top; tiles not done yet are 0; later passes refine */
+/* Light groups that have channels "radiance.GROUP", rising: those of all that emits; empty without LUMICUT_GROUPS. */
+LUMICUT_API lumicut_result lumicut_render_groups(lumicut_render render, const uint32_t** groups, uint64_t* count); /* [any] view */
 /* State after the last whole pass, for lumicut_render_desc.checkpoint; size 0: none yet. */
 LUMICUT_API lumicut_result lumicut_render_checkpoint(lumicut_render render, const void** data, uint64_t* size); /* [object] view */
 

@@ -1,0 +1,143 @@
+"""`lumicut render` in passes: stopped, killed, gone on; light groups mixed anew; illuminance."""
+import json
+import signal
+import subprocess
+import time
+import unittest
+
+from cli import BAD_FILE, COMMAND, INTERRUPTED, OK, SCENE, USAGE, Cli, lumicut
+
+SMALL = ["--size", "48x48", "--vpls", "300", "-q"]
+
+
+class Compared(Cli):
+    def difference(self, a, b, *arguments):
+        result = lumicut("compare", a, b, "--json", "--no-flip", *arguments)
+        self.assert_ends(result, OK)
+        return json.loads(result.stdout)
+
+
+class Progressive(Compared):
+    def test_a_killed_render_goes_on_to_the_unbroken_image(self):
+        whole, broken = self.folder / "whole.exr", self.folder / "broken.exr"
+        kept = self.folder / "render.checkpoint"
+        passes = ["--passes", "16", "-p", "compensate=true", *SMALL]
+        self.assert_ends(lumicut("render", SCENE, *passes, "--layers", "radiance,error", "-o", whole), OK)
+        process = subprocess.Popen([COMMAND, "render", SCENE, *passes, "--threads", "1", "--checkpoint", kept, "-o", broken])
+        limit = time.monotonic() + 60
+        while not kept.exists() and process.poll() is None and time.monotonic() < limit:
+            time.sleep(0.005)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        self.assertTrue(kept.exists())
+        self.assertFalse(broken.exists())
+        self.assert_ends(lumicut("render", SCENE, *passes, "--layers", "radiance,error", "--checkpoint", kept, "--resume",
+                                 "-o", broken), OK)
+        self.assertEqual(self.difference(broken, whole)["rmse"], 0)
+        self.assertEqual(self.difference(broken, whole, "--layer", "error")["rmse"], 0)
+
+    def test_a_stopped_render_keeps_its_passes(self):
+        kept = self.folder / "render.checkpoint"
+        process = subprocess.Popen([COMMAND, "render", SCENE, "--passes", "100000", *SMALL, "--checkpoint", kept, "-o",
+                                    self.folder / "a.exr"], stderr=subprocess.DEVNULL)
+        limit = time.monotonic() + 60
+        while not kept.exists() and process.poll() is None and time.monotonic() < limit:
+            time.sleep(0.005)
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(process.wait(60), INTERRUPTED)
+        self.assertEqual(self.files(), ["render.checkpoint"])
+
+    def test_checkpoints_of_anything_else_are_refused(self):
+        kept = self.folder / "render.checkpoint"
+        arguments = ["render", SCENE, *SMALL, "--checkpoint", kept, "-o", self.folder / "a.exr"]
+        self.assert_ends(lumicut(*arguments, "--passes", "2"), OK)
+        other = lumicut(*arguments, "--resume", "--passes", "4", "--seed", "5")
+        self.assertNotEqual(other.returncode, OK)
+        self.assertIn("render.checkpoint", other.stderr)
+        self.assertIn("another scene, size, integrator or parameters", other.stderr)
+        kept.write_bytes(kept.read_bytes()[:-100])
+        damaged = lumicut(*arguments, "--resume", "--passes", "4")
+        self.assertNotEqual(damaged.returncode, OK)
+        self.assertIn("cut short or damaged", damaged.stderr)
+
+    def test_a_target_stops_when_the_error_is_reached(self):
+        stats = self.folder / "stats.json"
+        self.assert_ends(lumicut("render", SCENE, *SMALL, "--target-error", "0.6", "--stats", stats), OK)
+        values = json.loads(stats.read_text())["values"]
+        self.assertGreaterEqual(values["passes"], 8)
+        self.assertLessEqual(values["error"], 0.6)
+
+    def test_wrong_words_are_named(self):
+        for arguments, text in ((["--confidence", "2"], "--confidence"), (["--resume"], "--checkpoint"),
+                                (["--squares", "2", "--passes", "2"], "--squares")):
+            self.assert_ends(lumicut("render", SCENE, *SMALL, "-o", self.folder / "a.exr", *arguments), USAGE, text)
+        self.assertEqual(self.files(), [])
+
+
+class Mix(Compared):
+    SCENE = {
+        "camera": {"eye": [0, 0, 4], "at": [0, 0, 0], "fov_y": 40},
+        "materials": [{"name": "grey", "diffuse": [0.5, 0.5, 0.5], "specular": [0.2, 0.2, 0.2], "shininess": 20}],
+        "meshes": [{"positions": [[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]], "quads": [[0, 1, 2, 3]],
+                    "material": "grey"}],
+        "lights": [{"type": "point", "position": [-1, 0, 1], "value": 3, "group": 1},
+                   {"type": "point", "position": [1, 0, 1], "value": 2, "color": [1, 0.5, 0.2], "group": 2}],
+    }
+
+    def render(self, scene, name, *arguments):
+        path, out = self.folder / f"{name}.json", self.folder / f"{name}.exr"
+        path.write_text(json.dumps(scene))
+        self.assert_ends(lumicut("render", path, "--size", "32x24", "-q", "-o", out, *arguments), OK)
+        return out
+
+    def test_a_mix_is_the_render_with_lamps_of_that_brightness(self):
+        groups = self.render(self.SCENE, "groups", "--groups")
+        scene = json.loads(json.dumps(self.SCENE))
+        scene["lights"][0]["value"] *= 0.25
+        scene["lights"][1]["color"] = [0.5, 0.5, 0.6]
+        truth, mixed = self.render(scene, "truth"), self.folder / "mixed.exr"
+        self.assert_ends(lumicut("mix", groups, "--gain", "1=0.25", "--gain", "2=0.5,1,3", "-o", mixed, "--png",
+                                 self.folder / "mixed.png"), OK)
+        self.assertLess(self.difference(mixed, truth)["rmse"], 1e-5)
+        self.assertEqual((self.folder / "mixed.png").read_bytes()[:4], b"\x89PNG")
+        # The groups together, as they are.
+        self.assert_ends(lumicut("mix", groups, "-o", mixed), OK)
+        self.assertLess(self.difference(mixed, groups)["rmse"], 1e-6)
+        self.assert_ends(lumicut("mix", groups, "--gain", "1=1", "--others", "0", "-o", mixed), OK)
+        del scene["lights"][1]
+        scene["lights"][0]["value"] = 3
+        self.assertLess(self.difference(mixed, self.render(scene, "one"))["rmse"], 1e-5)
+
+    def test_wrong_mixes_are_named(self):
+        groups, out = self.render(self.SCENE, "groups", "--groups"), self.folder / "out.exr"
+        plain = self.render(self.SCENE, "plain")
+        for arguments, code, text in (
+                ([groups, "--gain", "9=1"], USAGE, "no light group 9; there are 1, 2"),
+                ([groups, "--gain", "1=x"], USAGE, "\"x\" is not a number"),
+                ([groups, "--gain", "1=-2"], USAGE, "below 0"),
+                ([groups, "--gain", "1=1,2"], USAGE, "one number or three"),
+                ([groups, "--gain", "1=1", "--gain", "1=2"], USAGE, "twice"),
+                ([plain], BAD_FILE, "no layers radiance.GROUP"),
+                ([self.folder / "none.exr"], BAD_FILE, "none.exr")):
+            with self.subTest(text):
+                self.assert_ends(lumicut("mix", *arguments, "-o", out), code, text)
+        self.assertFalse(out.exists())
+
+
+class Lux(Cli):
+    def test_the_layer_is_lux(self):
+        path, out = self.folder / "floor.json", self.folder / "floor.exr"
+        path.write_text(json.dumps({
+            "camera": {"eye": [0, 0, 1], "at": [0, 0, 0], "fov_y": 0.01},
+            "materials": [{"name": "floor", "diffuse": [0.3, 0.6, 0.1]}],
+            "meshes": [{"positions": [[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]], "quads": [[0, 1, 2, 3]],
+                        "material": "floor"}],
+            "lights": [{"type": "point", "position": [0, 0, 2], "value": 8}]}))
+        self.assert_ends(lumicut("render", path, "--size", "2x2", "-q", "--layers", "radiance,illuminance", "-o", out), OK)
+        result = lumicut("compare", out, out, "--layer", "illuminance", "--json", "--no-flip")
+        self.assert_ends(result, OK)
+        self.assertAlmostEqual(json.loads(result.stdout)["reference_mean"] / (683 * 8 / 4), 1, delta=0.01)
+
+
+if __name__ == "__main__":
+    unittest.main()
