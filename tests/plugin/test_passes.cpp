@@ -165,4 +165,38 @@ TEST(Passes, ACheckpointIsShownOnlyWhereItIsKept) {
   EXPECT_EQ(lumicut_render_checkpoint(r.get(), &data, &size), LUMICUT_INVALID_STATE);
 }
 
+// The certificate: intervals from passes hold the path tracer's radiance as often as they say.
+TEST(Passes, IntervalsHoldThePathTracersRadianceAsOftenAsTheySay) {
+  const api::Device device(2);
+  const api::Scene s = scene(device);
+  constexpr uint32_t kWidth = 16, kHeight = 12;
+  const auto luminance = [](const std::vector<float>& rgb, size_t k) {
+    return 0.2126 * rgb[3 * k] + 0.7152 * rgb[3 * k + 1] + 0.0722 * rgb[3 * k + 2];
+  };
+  api::Integrator tracer = integrator(device, 1, "path_tracer");
+  tracer.set("samples", "40");
+  auto f = frame(kWidth, kHeight);
+  f.samples = 144;
+  const api::Render reference(tracer, s, f);
+  reference.wait();
+  const auto truth = reference.read("radiance");
+  double inside = 0, all = 0, sum = 0, truth_sum = 0;
+  for (int seed = 1; seed <= 12; ++seed) {
+    api::Integrator i = integrator(device, 150, "lightcuts");
+    i.set("compensate", "true");
+    i.set("seed", std::to_string(seed));
+    const Pictures p = pictures(i, s, passes_of(12, kWidth, kHeight));
+    for (size_t k = 0; k < p.error.size(); ++k) {
+      const double value = luminance(p.radiance, k), right = luminance(truth, k);
+      inside += std::abs(value - right) <= p.error[k];
+      all += 1, sum += value, truth_sum += right;
+    }
+  }
+  // The reference has 5,760 paths a pixel, a noise of about a tenth of the intervals'. Twelve sets of passes whose
+  // pixels share lights: the share itself is known to about 1 %.
+  EXPECT_GT(inside / all, 0.93);
+  EXPECT_LT(inside / all, 0.985);
+  EXPECT_NEAR(sum / truth_sum, 1.0, 0.01);
+}
+
 }  // namespace
