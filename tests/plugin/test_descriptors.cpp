@@ -237,14 +237,16 @@ TEST(Abi, DescriptorsOfAnySizeAreReadByTheGrowthRule) {
     const api::Integrator i = integrator(device, 10);
     auto d = make<T>();
     d.width = 16, d.height = 16, d.samples = 1, d.crop[2] = d.crop[3] = 8, d.tile_size = 8;
-    check_input("lumicut_render_desc", bytes_of(d),
-                {F(T, struct_size), F(T, width), F(T, height), F(T, samples), F(T, crop), F(T, tile_size)},
-                [&](const void* p) {
-                  lumicut_render made = nullptr;
-                  const auto code = lumicut_render_start(i.get(), fresh.get(), static_cast<const T*>(p), &made);
-                  lumicut_release(made);
-                  return code;
-                });
+    check_input(
+        "lumicut_render_desc", bytes_of(d),
+        {F(T, struct_size), F(T, width), F(T, height), F(T, samples), F(T, crop), F(T, tile_size), F(T, passes),
+         F(T, max_seconds), F(T, target_error), F(T, confidence), F(T, flags), F(T, checkpoint), F(T, checkpoint_size)},
+        [&](const void* p) {
+          lumicut_render made = nullptr;
+          const auto code = lumicut_render_start(i.get(), fresh.get(), static_cast<const T*>(p), &made);
+          lumicut_release(made);
+          return code;
+        });
     const api::Render r(i, fresh, d);
     r.wait();
     using Tile = lumicut_tile;
@@ -276,8 +278,9 @@ TEST(Abi, DescriptorsThatTheLibraryFillsAreFilledAsFarAsTheyReach) {
 
   {
     using T = lumicut_status;
-    const std::vector<Span> fields = {F(T, struct_size), F(T, state),      F(T, phase),      F(T, fraction),
-                                      F(T, seconds),     F(T, tiles_done), F(T, tiles_total)};
+    const std::vector<Span> fields = {F(T, struct_size),  F(T, state),      F(T, phase),       F(T, fraction),
+                                      F(T, seconds),      F(T, tiles_done), F(T, tiles_total), F(T, passes_done),
+                                      F(T, passes_total), F(T, error)};
     check_output("lumicut_status", sizeof(T), fields,
                  [&](void* p) { return lumicut_get_status(r.get(), static_cast<T*>(p)); });
   }
