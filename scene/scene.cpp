@@ -241,22 +241,67 @@ SurfacePoint Scene::shade_point(const Vec3f& position, const Vec3f& geometric_no
   SurfacePoint p;
   p.position = position + geometric_normal * (behind ? -epsilon_ : epsilon_);
   p.normal = behind ? -normal : normal;
-  p.mirror = normalize(reflect(to_viewer, p.normal));
-  p.diffuse = diffuse_color(material_index, uv) * kInvPi;
-  p.specular = specular_color(material_index, uv) * lobe_scale(material.phong, material.shininess);
-  p.shininess = material.shininess;
   p.pixel = pixel;
+  if (material.lobe == LobeModel::ggx) {
+    set_ggx(material, ggx_colors(material_index, uv), to_viewer, p);
+    return p;
+  }
+  p.mirror = normalize(reflect(to_viewer, p.normal));
+  p.diffuse = diffuse_texel(material, uv) * kInvPi;
+  p.specular = specular_texel(material, uv) * lobe_scale(material.lobe == LobeModel::phong, material.shininess);
+  p.shininess = material.shininess;
   return p;
+}
+
+void Scene::set_ggx(const Material& material, const GgxColors& colors, const Vec3f& to_viewer, SurfacePoint& p) const {
+  // Bent shading normals may turn from the viewer: seen edge-on then.
+  constexpr float kEdge = 0.01f;
+  float cosine = dot(p.normal, to_viewer);
+  Vec3f view = to_viewer;
+  if (cosine < kEdge) view = normalize(view + p.normal * (kEdge - cosine)), cosine = kEdge;
+  p.mirror = normalize(reflect(view, p.normal));
+  const float alpha = std::max(kLeastAlpha, material.alpha());
+  const GgxBase base = ggx_base(colors, material.alpha());
+  const float m = 1.0f - std::min(1.0f, cosine);
+  p.diffuse = base.scale * ((1.0f - base.fade * (m * m) * (m * m)) * kInvPi);
+  p.fade = base.fade;
+  p.shininess = -alpha;
+  if (material.alpha() >= kLeastAlpha) p.specular = colors.specular, p.grazing = colors.grazing;
+}
+
+Rgb Scene::diffuse_texel(const Material& m, Vec2f uv) const {
+  return m.diffuse_texture < 0 ? m.diffuse : m.diffuse * textures_[m.diffuse_texture].color(uv.x, uv.y);
+}
+
+Rgb Scene::specular_texel(const Material& m, Vec2f uv) const {
+  return m.specular_texture < 0 ? m.specular : m.specular * textures_[m.specular_texture].color(uv.x, uv.y);
 }
 
 Rgb Scene::diffuse_color(uint32_t material, Vec2f uv) const {
   const Material& m = materials_[material];
-  return m.diffuse_texture < 0 ? m.diffuse : m.diffuse * textures_[m.diffuse_texture].color(uv.x, uv.y);
+  const Rgb color = diffuse_texel(m, uv);
+  return m.lobe == LobeModel::ggx ? color * ((1.0f - m.metallic) * (1.0f - m.transmission)) : color;
 }
 
 Rgb Scene::specular_color(uint32_t material, Vec2f uv) const {
   const Material& m = materials_[material];
-  return m.specular_texture < 0 ? m.specular : m.specular * textures_[m.specular_texture].color(uv.x, uv.y);
+  return m.lobe == LobeModel::ggx ? ggx_colors(material, uv).specular : specular_texel(m, uv);
+}
+
+GgxColors Scene::ggx_colors(uint32_t material, Vec2f uv) const {
+  const Material& m = materials_[material];
+  GgxColors c;
+  c.base = diffuse_texel(m, uv);
+  c.metal = m.metallic;
+  c.clear = (1.0f - m.metallic) * m.transmission;
+  c.opaque = (1.0f - m.metallic) * (1.0f - m.transmission);
+  const float r = (m.ior - 1.0f) / (m.ior + 1.0f);
+  c.f0 = specular_texel(m, uv) * (r * r);
+  c.specular = c.base * c.metal + c.f0 * c.opaque;
+  // What hardly reflects has no bright edge either.
+  const auto edge = [](const Rgb& f0) { return std::min(1.0f, 50.0f * max_component(f0)); };
+  c.grazing = edge(c.base) * c.metal + edge(c.f0) * c.opaque;
+  return c;
 }
 
 Rgb Scene::emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const {

@@ -103,14 +103,19 @@ class Scene final : private HitFilter {
   // The same for a host's own point. `material` must be in range (checked by the caller).
   SurfacePoint shade_point(const Vec3f& position, const Vec3f& geometric_normal, const Vec3f& normal, Vec2f uv,
                            uint32_t material, const Vec3f& to_viewer, uint32_t pixel) const;
+  // kd and ks; of GGX materials what is diffuse beneath the coat, and F0 of metal and coat.
   Rgb diffuse_color(uint32_t material, Vec2f uv) const;
   Rgb specular_color(uint32_t material, Vec2f uv) const;
+  GgxColors ggx_colors(uint32_t material, Vec2f uv) const;
   // Radiance emitted by a surface towards `to_viewer`.
   Rgb emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const;
   // Radiance of the environment seen along `direction` (unit).
   Rgb environment_radiance(const Vec3f& direction) const;
 
  private:
+  Rgb diffuse_texel(const Material& material, Vec2f uv) const;
+  Rgb specular_texel(const Material& material, Vec2f uv) const;
+  void set_ggx(const Material& material, const GgxColors& colors, const Vec3f& to_viewer, SurfacePoint& point) const;
   bool passes(uint32_t mesh, uint32_t prim, float u, float v) const override;
   void check_references() const;
 
