@@ -145,8 +145,13 @@ class Writer:
         return {"file": name, **options} if options else name
 
     def material(self, name, m):
-        out = {"name": name, "diffuse": numbers(m.diffuse), "specular": numbers(m.specular),
-               "shininess": numbers([m.shininess])[0]}
+        out = {"name": name, "diffuse": numbers(m.diffuse), "specular": numbers(m.specular)}
+        if m.flags & library.GGX:
+            out["model"] = "ggx"
+            for key in ("roughness", "metallic", "ior", "transmission"):
+                out[key] = numbers([getattr(m, key)])[0]
+        else:
+            out["shininess"] = numbers([m.shininess])[0]
         if m.flags & library.PHONG:
             out["model"] = "phong"
         if m.opacity not in (0.0, 1.0):
