@@ -299,6 +299,9 @@ class SceneReader {
     texture("specular_texture", m.specular_texture, TextureUse::colour);
     texture("opacity_texture", m.opacity_texture, TextureUse::mask);
     texture("emission_texture", m.emission_texture, TextureUse::colour);
+    texture("normal_texture", m.normal_texture, TextureUse::vectors);
+    if (auto strength = object.find("normal_strength"))
+      m.normal_strength = static_cast<float>(strength->number(1e-3, 10));
   }
 
   void read_materials(const JsonValue& value) {

@@ -85,6 +85,9 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   m.emit_both_sides = (in.flags & LUMICUT_EMIT_BOTH_SIDES) != 0;
   m.diffuse_texture = texture_index(c, "diffuse_texture", in.diffuse_texture);
   m.specular_texture = texture_index(c, "specular_texture", in.specular_texture);
+  m.normal_texture = texture_index(c, "normal_texture", in.normal_texture);
+  c.range("normal_strength", in.normal_strength, 0.0f, 10.0f);
+  m.normal_strength = in.normal_strength == 0.0f ? 1.0f : in.normal_strength;
   m.opacity_texture = texture_index(c, "opacity_texture", in.opacity_texture);
   m.emission_texture = texture_index(c, "emission_texture", in.emission_texture);
   return m;

@@ -26,6 +26,8 @@ struct Material {
   float opacity = 1.0f;
   Rgb emission{};  // radiance, W/(sr·m²), from the side the geometric normal points to
   bool emit_both_sides = false;
+  float normal_strength = 1.0f;
+  int32_t normal_texture = -1;
   int32_t diffuse_texture = -1, specular_texture = -1, opacity_texture = -1, emission_texture = -1;
 
   bool emissive() const { return max_component(emission) > 0.0f; }

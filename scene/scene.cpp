@@ -117,6 +117,7 @@ void Scene::check_references() const {
     check_texture(materials_[i].specular_texture, i, "specular_texture");
     check_texture(materials_[i].opacity_texture, i, "opacity_texture");
     check_texture(materials_[i].emission_texture, i, "emission_texture");
+    check_texture(materials_[i].normal_texture, i, "normal_texture");
   }
   if (environment_.texture >= 0 && static_cast<size_t>(environment_.texture) >= textures_.size())
     fail_argument("environment.texture = " + std::to_string(environment_.texture) + " is out of range: the scene has " +
@@ -226,8 +227,37 @@ SurfaceHit Scene::surface(const RayHit& rh) const {
   if (!mesh.uvs.empty()) {
     const Vec2f a = mesh.uvs[tri[0]], b = mesh.uvs[tri[1]], c = mesh.uvs[tri[2]];
     s.uv = {a.x * w + b.x * hit.u + c.x * hit.v, a.y * w + b.y * hit.u + c.y * hit.v};
+    if (const Material& material = materials_[s.material]; material.normal_texture >= 0)
+      s.normal = mapped_normal(material, s, {p[1] - p[0], p[2] - p[0]}, {a, b, c});
   }
   return s;
+}
+
+// The tangent is the triangle's own direction of growing u, laid into the shading normal's plane: seams of the map
+// between triangles are not smoothed over.
+Vec3f Scene::mapped_normal(const Material& material, const SurfaceHit& hit, const Vec3f (&edges)[2],
+                           const Vec2f (&corners)[3]) const {
+  const Vec2f d1{corners[1].x - corners[0].x, corners[1].y - corners[0].y},
+      d2{corners[2].x - corners[0].x, corners[2].y - corners[0].y};
+  const float det = d1.x * d2.y - d2.x * d1.y;
+  if (!(std::abs(det) > 0.0f)) return hit.normal;
+  const float sign = det < 0.0f ? -1.0f : 1.0f;
+  const Vec3f along_u = (edges[0] * d2.y - edges[1] * d1.y) * sign,
+              along_v = (edges[1] * d1.x - edges[0] * d2.x) * sign;
+  const Vec3f t = normalize(along_u - hit.normal * dot(along_u, hit.normal));
+  if (t == Vec3f{} || !is_finite(t)) return hit.normal;
+  Vec3f b = cross(hit.normal, t);
+  if (dot(b, along_v) < 0.0f) b = -b;
+  const Rgb c = textures_[material.normal_texture].color(hit.uv.x, hit.uv.y);
+  const Vec3f local = normalize(Vec3f{2.0f * c.x - 1.0f, 2.0f * c.y - 1.0f, std::max(0.0f, 2.0f * c.z - 1.0f)});
+  if (local == Vec3f{}) return hit.normal;
+  const Vec3f bent = t * local.x + b * local.y + hit.normal * local.z;
+  Vec3f n = normalize(hit.normal + (bent - hit.normal) * material.normal_strength);
+  // Not below the surface itself.
+  constexpr float kLeast = 0.02f;
+  if (const float up = dot(n, hit.geometric_normal); up < kLeast)
+    n = normalize(n + hit.geometric_normal * (kLeast - up));
+  return n == Vec3f{} ? hit.normal : n;
 }
 
 SurfacePoint Scene::shade_point(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const {

@@ -96,7 +96,7 @@ class Scene final : private HitFilter {
     return instanced_ ? first_instance_[mesh] + index : kNoId;
   }
 
-  // Makes a hit of `accel()` whole.
+  // Makes a hit of `accel()` whole. Normal maps turn its shading normal; a host's own points bring theirs.
   SurfaceHit surface(const RayHit& hit) const;
   // The point to shade at a surface seen from direction `to_viewer` (unit, away from the surface).
   SurfacePoint shade_point(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const;
@@ -113,6 +113,9 @@ class Scene final : private HitFilter {
   Rgb environment_radiance(const Vec3f& direction) const;
 
  private:
+  // `edges`: from the triangle's first corner to the others. `corners`: its uvs.
+  Vec3f mapped_normal(const Material& material, const SurfaceHit& hit, const Vec3f (&edges)[2],
+                      const Vec2f (&corners)[3]) const;
   Rgb diffuse_texel(const Material& material, Vec2f uv) const;
   Rgb specular_texel(const Material& material, Vec2f uv) const;
   void set_ggx(const Material& material, const GgxColors& colors, const Vec3f& to_viewer, SurfacePoint& point) const;

@@ -78,7 +78,7 @@ class Material(Descriptor):
                 ("specular", c_float * 3), ("opacity", c_float), ("emission", c_float * 3),
                 ("diffuse_texture", c_int32), ("specular_texture", c_int32), ("opacity_texture", c_int32),
                 ("emission_texture", c_int32), ("roughness", c_float), ("metallic", c_float), ("ior", c_float),
-                ("transmission", c_float)]
+                ("transmission", c_float), ("normal_texture", c_int32), ("normal_strength", c_float)]
 
 
 class Mesh(Descriptor):
@@ -132,7 +132,7 @@ class ChannelInfo(Descriptor):
 
 
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
-SIZES = {DeviceDesc: 32, Status: 48, SceneDesc: 16, Texture: 32, Material: 84, Mesh: 88, Light: 100, Environment: 64,
+SIZES = {DeviceDesc: 32, Status: 48, SceneDesc: 16, Texture: 32, Material: 92, Mesh: 88, Light: 100, Environment: 64,
          Camera: 92, IntegratorInfo: 40, ParamInfo: 72, RenderDesc: 36, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32

@@ -62,6 +62,8 @@ def luminance(value):
 class SurfaceReader(Evaluator):
     """Closures of one material's tree, added up."""
 
+    normals = None  # (picture, strength)
+
     def surface(self, socket, stack=()):
         node, output, stack = self.source(socket, stack)
         if node is None:
@@ -112,10 +114,21 @@ class SurfaceReader(Evaluator):
 
     def bumps(self, node, stack):
         socket = node.inputs.get("Normal")
-        if socket is not None and socket.is_linked:
-            source = self.source(socket, stack)[0]
-            if source is not None:
-                self.note(source.bl_label, "Normal and bump maps left out")
+        if socket is None or not socket.is_linked:
+            return
+        source, _, stack = self.source(socket, stack)
+        if source is None:
+            return
+        if source.type == "NORMAL_MAP" and source.space == "TANGENT":
+            colour = self.value(source.inputs["Color"], stack)
+            strength = self.number(source.inputs["Strength"], stack, "normal strength")
+            if colour.picture is not None and (colour.factor == 1).all():
+                if strength > 0 and self.normals is None:
+                    self.normals = colour.picture, min(10.0, strength)
+                elif strength > 0 and self.normals[0].key != colour.picture.key:
+                    self.note(colour.picture.name, "Several normal maps in one material, the first taken")
+                return
+        self.note(source.bl_label, "Normal and bump maps left out")
 
     def roughness(self, node, stack):
         return min(1.0, max(0.0, self.number(node.inputs.get("Roughness"), stack, "roughness")))
@@ -277,7 +290,7 @@ class Materials:
 
     def _convert(self, material):
         name = "default" if material is None else material.name
-        surface = self._surface(material, name)
+        surface, normals = self._surface(material, name)
         m = library.Material(opacity=1.0)
         pictures = {}
         factors = {}
@@ -305,8 +318,10 @@ class Materials:
             m.opacity = HOLE if opacity < 0.5 else 1.0
         else:
             m.opacity = min(1.0, max(opacity, 0.01))
+        if normals is not None:
+            pictures["normal"], m.normal_strength = normals
         mappings = {p.mapping for p in pictures.values()}
-        mapping = next((pictures[slot].mapping for slot in SLOTS if slot in pictures), Mapping())
+        mapping = next((pictures[slot].mapping for slot in SLOTS + ("normal",) if slot in pictures), Mapping())
         if len(mappings) > 1:
             self.report.note(name, "Textures of one material on several coordinates, all laid on the first's")
         for slot, picture in pictures.items():
@@ -368,16 +383,16 @@ class Materials:
 
     def _surface(self, material, name):
         if material is None:
-            return Surface(diffuse=Value(0.8))
+            return Surface(diffuse=Value(0.8)), None
         if not material.use_nodes or material.node_tree is None:
-            return Surface(diffuse=Value(list(material.diffuse_color)[:3]))
+            return Surface(diffuse=Value(list(material.diffuse_color)[:3])), None
         reader = SurfaceReader(name, self.images, self.report)
         tree = material.node_tree
         output = tree.get_output_node("CYCLES") or tree.get_output_node("ALL")
         if output is None:
-            return Surface()
+            return Surface(), None
         for socket in ("Volume", "Displacement"):
             if output.inputs[socket].is_linked:
                 reader.note("", f"{socket}s left out" if socket == "Volume" else "Displacement left out")
         # Outputs inside a group cannot be: the output stands in the tree itself.
-        return reader.surface(output.inputs["Surface"])
+        return reader.surface(output.inputs["Surface"]), reader.normals

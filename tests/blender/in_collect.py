@@ -245,6 +245,19 @@ class MaterialTrees(unittest.TestCase):
         self.assertAlmostEqual(out.roughness, materials.roughness_of(300), places=6)
         self.assertTrue(any("gloss limit" in n and "Stuff" in n for n in notes))
 
+    def test_normal_maps(self):
+        m, node = self.principled()
+        texture = m.node_tree.nodes.new("ShaderNodeTexImage")
+        texture.image = self.image(srgb=False)
+        mapped = m.node_tree.nodes.new("ShaderNodeNormalMap")
+        mapped.inputs["Strength"].default_value = 0.5
+        m.node_tree.links.new(texture.outputs["Color"], mapped.inputs["Color"])
+        m.node_tree.links.new(mapped.outputs[0], node.inputs["Normal"])
+        out, notes, data = the_material(m)
+        self.assertEqual((out.normal_texture, out.normal_strength), (1, 0.5))
+        self.assertEqual(data.images[0].flags & library.SRGB, 0)
+        self.assertFalse(any("Normal" in n for n in notes), notes)
+
     def test_mirrors_stay_mirrors(self):
         m, _ = self.principled(**{"Roughness": 0.0, "Metallic": 1.0})
         out, _, _ = the_material(m)

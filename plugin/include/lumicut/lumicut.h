@@ -168,6 +168,9 @@ typedef struct lumicut_material {
   float metallic;          /* 0..1 */
   float ior;               /* 0.1..10; 0: not given, taken as 1.5 */
   float transmission;      /* 0..1: share of glass in what is not metal */
+  /* Any model */
+  int32_t normal_texture;  /* 1 + index; 0: none. Linear; (r, g, b) is (1 + n)/2 of the normal along u, v and out of the surface */
+  float normal_strength;   /* 0..10; 0: not given, taken as 1 */
 } lumicut_material;
 enum { LUMICUT_EMIT_BOTH_SIDES = 1, LUMICUT_PHONG = 2, LUMICUT_GGX = 4 };
 
