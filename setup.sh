@@ -4,7 +4,7 @@ set -euo pipefail
 
 packages=(
   build-essential cmake ninja-build pkg-config git ccache clang-format  # tools
-  libembree-dev libtbb-dev libhwy-dev                                   # the library: rays, threads, SIMD
+  libembree-dev libtbb-dev libhwy-dev libboost-dev                      # the library: rays, threads, SIMD, Student's t
   libopenexr-dev libimath-dev libopenimageio-dev libtinyobjloader-dev   # the command's files
   nlohmann-json3-dev libcli11-dev libfmt-dev                            # the command's words
   libcgal-dev libgmp-dev libmpfr-dev                                    # geometry/ (a target of its own)

@@ -48,9 +48,9 @@ HWY_INLINE void Run(std::span<const Vpl> lights, float weight, float clamp2, con
     const V3 diffuse = Load3(d, points.diffuse, p);
     V3 out{hn::Mul(diffuse.x, even.x), hn::Mul(diffuse.y, even.y), hn::Mul(diffuse.z, even.z)};
     if constexpr (kLobes == Lobes::ggx) {
-      const V grazing = Load1(d, points.grazing, p);
-      out = {hn::MulAdd(grazing, edge.x, out.x), hn::MulAdd(grazing, edge.y, out.y),
-             hn::MulAdd(grazing, edge.z, out.z)};
+      const V3 grazing = Load3(d, points.grazing, p);
+      out = {hn::MulAdd(grazing.x, edge.x, out.x), hn::MulAdd(grazing.y, edge.y, out.y),
+             hn::MulAdd(grazing.z, edge.z, out.z)};
     }
     if constexpr (kLobes != Lobes::none) {
       const V3 specular = Load3(d, points.specular, p);

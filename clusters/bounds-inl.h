@@ -113,9 +113,9 @@ HWY_INLINE V BoundOfFresnel(D d, V beta, V nv) {
 }
 
 // specular + (grazing − specular)·fresnel, where that is more.
-HWY_INLINE V3 BoundOfSchlick(D d, const V3& specular, V grazing, V fresnel) {
-  const auto one = [&](V s) { return hn::MulAdd(hn::Max(hn::Zero(d), hn::Sub(grazing, s)), fresnel, s); };
-  return {one(specular.x), one(specular.y), one(specular.z)};
+HWY_INLINE V3 BoundOfSchlick(D d, const V3& specular, const V3& grazing, V fresnel) {
+  const auto one = [&](V s, V g) { return hn::MulAdd(hn::Max(hn::Zero(d), hn::Sub(g, s)), fresnel, s); };
+  return {one(specular.x, grazing.x), one(specular.y, grazing.y), one(specular.z, grazing.z)};
 }
 
 // Largest factor of the diffuse part, which grows with the cosine.
@@ -180,7 +180,7 @@ HWY_INLINE void Bounds(const LightNode& node, const PointBlock& block, float cla
         const V nv = Dot(normal, mirror), alpha2 = Square(shininess);
         lobe = hn::IfThenElse(ggx, BoundOfGgxLobe(d, beta, cosine, alpha2, alpha2, nv), lobe);
         const V fresnel = hn::IfThenElseZero(ggx, BoundOfFresnel(d, beta, nv));
-        share = BoundOfSchlick(d, specular, hn::Load(d, block.grazing + i), fresnel);
+        share = BoundOfSchlick(d, specular, Load3(d, block.grazing, i), fresnel);
         const V fading = BoundOfFading(d, hn::Load(d, block.fade + i), cosine);
         f = {hn::Mul(f.x, fading), hn::Mul(f.y, fading), hn::Mul(f.z, fading)};
       }

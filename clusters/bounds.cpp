@@ -35,9 +35,9 @@ void PointBlock::load(const ShadePoints& points, size_t first) {
       position[k][i] = p.position[k];
       normal[k][i] = p.normal[k], tangent[k][i] = n.t[k], bitangent[k][i] = n.b[k];
       mirror[k][i] = p.mirror[k], mirror_tangent[k][i] = m.t[k], mirror_bitangent[k][i] = m.b[k];
-      diffuse[k][i] = p.diffuse[k], specular[k][i] = p.specular[k];
+      diffuse[k][i] = p.diffuse[k], specular[k][i] = p.specular[k], grazing[k][i] = p.grazing[k];
     }
-    shininess[i] = p.shininess, grazing[i] = p.grazing, fade[i] = p.fade;
+    shininess[i] = p.shininess, fade[i] = p.fade;
     ggx = ggx || p.ggx();
   }
 }

@@ -120,9 +120,10 @@ HWY_INLINE V3 Reflectance(D d, const Points& points, size_t p, const V3& normal,
     const Parts parts =
         PartsTowards<kLobes>(d, points, p, normal, Load3(d, points.mirror, p), Load1(d, points.shininess, p), to_light);
     if constexpr (kLobes == Lobes::ggx) {
-      const V edge = hn::Mul(parts.grazing, Load1(d, points.grazing, p));
-      f = {hn::MulAdd(f.x, parts.diffuse, edge), hn::MulAdd(f.y, parts.diffuse, edge),
-           hn::MulAdd(f.z, parts.diffuse, edge)};
+      const V3 edge = Load3(d, points.grazing, p);
+      f = {hn::MulAdd(edge.x, parts.grazing, hn::Mul(f.x, parts.diffuse)),
+           hn::MulAdd(edge.y, parts.grazing, hn::Mul(f.y, parts.diffuse)),
+           hn::MulAdd(edge.z, parts.grazing, hn::Mul(f.z, parts.diffuse))};
     }
     f = {hn::MulAdd(specular.x, parts.specular, f.x), hn::MulAdd(specular.y, parts.specular, f.y),
          hn::MulAdd(specular.z, parts.specular, f.z)};

@@ -73,7 +73,7 @@ HWY_INLINE void PairBoundsOf(const LightNode& node, const PointNodes& nodes, flo
         const V ggx =
             BoundOfGgxLobe(d, beta, cosine, hn::Load(d, nodes.alpha2_low + i), hn::Load(d, nodes.alpha2_high + i), nv);
         const V3 share =
-            BoundOfSchlick(d, Load3(d, nodes.schlick, i), hn::Load(d, nodes.grazing + i), BoundOfFresnel(d, beta, nv));
+            BoundOfSchlick(d, Load3(d, nodes.schlick, i), Load3(d, nodes.grazing, i), BoundOfFresnel(d, beta, nv));
         // A point has one of the two lobes.
         gloss = {hn::Max(gloss.x, hn::Mul(share.x, ggx)), hn::Max(gloss.y, hn::Mul(share.y, ggx)),
                  hn::Max(gloss.z, hn::Mul(share.z, ggx))};
@@ -136,20 +136,21 @@ void pair_distances2(const LightNode& node, const PointNodes& nodes, float clamp
 
 void PointNodes::set(size_t lane, const ShadePoints& points, size_t first, size_t count) {
   Aabb box, normals, mirrors;
-  Rgb kd{}, ks{}, f0{};
+  Rgb kd{}, ks{}, f0{}, f90{};
   constexpr float kMost = std::numeric_limits<float>::infinity();
-  float least = kMost, f90 = 0.0f, low2 = kMost, high2 = 0.0f, view = 1.0f, fades = kMost;
+  float least = kMost, low2 = kMost, high2 = 0.0f, view = 1.0f, fades = kMost;
   for (size_t i = first; i < first + count; ++i) {
     box.extend(points.position_at(i));
     normals.extend(points.normal_at(i));
     kd = max(kd, Rgb{points.diffuse[0][i], points.diffuse[1][i], points.diffuse[2][i]});
     const Rgb s{points.specular[0][i], points.specular[1][i], points.specular[2][i]};
     fades = std::min(fades, points.fade[i]);
-    if (!(max_component(s) > 0.0f || points.grazing[i] > 0.0f)) continue;
+    const Rgb edge{points.grazing[0][i], points.grazing[1][i], points.grazing[2][i]};
+    if (!(max_component(s) > 0.0f || max_component(edge) > 0.0f)) continue;
     const Vec3f m{points.mirror[0][i], points.mirror[1][i], points.mirror[2][i]};
     mirrors.extend(m);
     if (const float n = points.shininess[i]; n < 0.0f) {
-      f0 = max(f0, s), f90 = std::max(f90, points.grazing[i]);
+      f0 = max(f0, s), f90 = max(f90, edge);
       low2 = std::min(low2, n * n), high2 = std::max(high2, n * n);
       view = std::min(view, dot(points.normal_at(i), m));
     } else {
@@ -175,8 +176,8 @@ void PointNodes::set(size_t lane, const ShadePoints& points, size_t first, size_
   mirror_cos[lane] = shine.cos_half, mirror_sin[lane] = shine.sin_half();
   put(diffuse, kd), put(specular, ks);
   shininess[lane] = least < kMost ? least : 0.0f;
-  put(schlick, f0);
-  grazing[lane] = f90, view_cosine[lane] = view, fade[lane] = fades;
+  put(schlick, f0), put(grazing, f90);
+  view_cosine[lane] = view, fade[lane] = fades;
   alpha2_low[lane] = high2 > 0.0f ? low2 : 1.0f, alpha2_high[lane] = high2 > 0.0f ? high2 : 1.0f;
 }
 
@@ -184,10 +185,10 @@ void PointNodes::pad(size_t lane) {
   const auto copy = [lane](float(&a)[kLanes]) { std::fill(a + lane, a + kLanes, a[lane - 1]); };
   for (int k = 0; k < 3; ++k)
     for (auto* a : {&center, &half, &normal, &tangent, &bitangent, &mirror, &mirror_tangent, &mirror_bitangent,
-                    &diffuse, &specular, &schlick})
+                    &diffuse, &specular, &schlick, &grazing})
       copy((*a)[k]);
-  for (auto* a : {&normal_cos, &normal_sin, &mirror_cos, &mirror_sin, &shininess, &radius2, &grazing, &alpha2_low,
-                  &alpha2_high, &view_cosine, &fade})
+  for (auto* a : {&normal_cos, &normal_sin, &mirror_cos, &mirror_sin, &shininess, &radius2, &alpha2_low, &alpha2_high,
+                  &view_cosine, &fade})
     copy(*a);
 }
 

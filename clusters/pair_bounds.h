@@ -16,7 +16,7 @@ struct alignas(64) PointNodes {
       mirror_sin[kLanes];
   float diffuse[3][kLanes], specular[3][kLanes];  // largest of the points, channel by channel
   float shininess[kLanes];                        // least of Blinn's and Phong's points
-  float schlick[3][kLanes], grazing[kLanes];      // F0 and F90: largest of the GGX points, channel by channel
+  float schlick[3][kLanes], grazing[3][kLanes];   // F0 and F90: largest of the GGX points, channel by channel
   float alpha2_low[kLanes], alpha2_high[kLanes];  // least and largest α² of the GGX points
   float view_cosine[kLanes];                      // least cosine of a GGX point's normal to the viewer
   float fade[kLanes];                             // least of all points

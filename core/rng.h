@@ -26,7 +26,9 @@ enum class Stage : uint32_t {
   visibility,
   reference,
   test,
-  octree_shift
+  octree_shift,
+  eye_ray,
+  path
 };
 
 // PCG32 (XSH-RR). [O'Neill 2014]

@@ -17,6 +17,8 @@ std::span<const ChannelInfo> channel_table() {
       {Channel::cut_size, "cut_size", 1, "Clusters or lights summed, a sample"},
       {Channel::rays, "rays", 1, "Shadow rays, a sample"},
       {Channel::bounds, "bounds", 1, "Error bounds evaluated, a sample"},
+      {Channel::error, "error", 1,
+       "Half the width of the confidence interval of the luminance, W/(sr m2); 0 before two passes"},
   };
   return table;
 }
@@ -25,6 +27,24 @@ Film::Film(Rect crop) : crop_(crop) {
   const size_t pixels = size_t{crop.width()} * crop.height();
   for (const ChannelInfo& c : channel_table())
     planes_[static_cast<size_t>(c.channel)].assign(pixels * c.components, 0.0f);
+}
+
+void Film::save(std::vector<uint8_t>& out) const {
+  for (const auto& plane : planes_) {
+    const auto* bytes = reinterpret_cast<const uint8_t*>(plane.data());
+    out.insert(out.end(), bytes, bytes + plane.size() * sizeof(float));
+  }
+}
+
+bool Film::load(std::span<const uint8_t> bytes) {
+  size_t size = 0;
+  for (const auto& plane : planes_) size += plane.size() * sizeof(float);
+  if (bytes.size() != size) return false;
+  for (auto& plane : planes_) {
+    std::memcpy(plane.data(), bytes.data(), plane.size() * sizeof(float));
+    bytes = bytes.subspan(plane.size() * sizeof(float));
+  }
+  return true;
 }
 
 void Film::read(Channel channel, const Rect& rect, float* out) const {

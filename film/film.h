@@ -4,13 +4,14 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/vec.h"
 
 namespace lumicut {
 
-enum class Channel : uint32_t { radiance, alpha, depth, normal, albedo, position, cut_size, rays, bounds };
+enum class Channel : uint32_t { radiance, alpha, depth, normal, albedo, position, cut_size, rays, bounds, error };
 
 struct ChannelInfo {
   Channel channel;
@@ -34,6 +35,9 @@ class Film {
   const Rect& crop() const { return crop_; }
   // Pixel in image coordinates; components as in channel_table.
   float* pixel(Channel channel, uint32_t x, uint32_t y) {
+    return const_cast<float*>(std::as_const(*this).pixel(channel, x, y));
+  }
+  const float* pixel(Channel channel, uint32_t x, uint32_t y) const {
     const auto c = static_cast<size_t>(channel);
     return planes_[c].data() +
            (static_cast<size_t>(y - crop_.y0) * crop_.width() + (x - crop_.x0)) * channel_table()[c].components;
@@ -43,12 +47,15 @@ class Film {
     p[0] = v.x, p[1] = v.y, p[2] = v.z;
   }
   void set(Channel channel, uint32_t x, uint32_t y, float v) { *pixel(channel, x, y) = v; }
+  // All planes as bytes, and back: false where the size does not fit.
+  void save(std::vector<uint8_t>& out) const;
+  bool load(std::span<const uint8_t> bytes);
   // Copies a rectangle inside the crop, rows packed. `out` holds width·height·components floats.
   void read(Channel channel, const Rect& rect, float* out) const;
 
  private:
   Rect crop_;
-  std::vector<float> planes_[9];
+  std::vector<float> planes_[10];
 };
 
 }  // namespace lumicut

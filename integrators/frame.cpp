@@ -1,9 +1,10 @@
 #include "integrators/frame.h"
 
-#include <atomic>
+#include <optional>
 
 #include "core/parallel.h"
 #include "core/rng.h"
+#include "integrators/eye_rays.h"
 
 namespace lumicut {
 
@@ -69,34 +70,39 @@ class Batch {
     points_.finish();
   }
 
-  void shade(const Integrator& integrator, ShadeContext context) {
-    radiance_.resize(points_.size());
-    counts_.resize(points_.size());
-    integrator.shade(points_, radiance_, counts_, context);
+  // The points of the camera, and those that rays from them find.
+  void shade(const Integrator& integrator, const EyeRays* eye_rays, ShadeContext context) {
+    light_.assign(pixels_.size(), {});
+    counts_.assign(pixels_.size(), {});
+    add_light(integrator, points_, context);
+    if (eye_rays == nullptr) return;
+    EyeHits hits;
+    const ShadePoints* points = &points_;
+    for (uint32_t level = 1; level <= kMaxLevels && points->size() > 0; ++level) {
+      context.progress.check();
+      Counters counters;
+      hits = eye_rays->trace(*points, level, counters);
+      context.stats.add(counters);
+      for (size_t i = 0; i < hits.light.size(); ++i) light_[hits.pixel[i]] += hits.light[i];
+      add_light(integrator, hits.points, context);
+      points = &hits.points;
+    }
   }
 
   void write(Film& film) const {
-    std::vector<Rgb> light(pixels_.size());
-    std::vector<Vec3f> counts(pixels_.size());
-    for (size_t i = 0; i < points_.size(); ++i) {
-      const uint32_t p = points_.pixel[i];
-      light[p] += radiance_[i];
-      counts[p] += Vec3f{static_cast<float>(counts_[i].clusters), static_cast<float>(counts_[i].rays),
-                         static_cast<float>(counts_[i].bounds)};
-    }
     const float scale = 1.0f / static_cast<float>(options_.samples);
     for (size_t p = 0; p < pixels_.size(); ++p) {
       const auto [x, y] = pixels_[p];
       const PixelSums& s = sums_[p];
-      film.set(Channel::radiance, x, y, (s.radiance + light[p]) * scale);
+      film.set(Channel::radiance, x, y, (s.radiance + light_[p]) * scale);
       film.set(Channel::alpha, x, y, s.hits * scale);
       film.set(Channel::depth, x, y, s.depth);
       film.set(Channel::normal, x, y, normalize(s.normal));
       film.set(Channel::albedo, x, y, s.albedo * scale);
       film.set(Channel::position, x, y, s.position);
-      film.set(Channel::cut_size, x, y, counts[p].x * scale);
-      film.set(Channel::rays, x, y, counts[p].y * scale);
-      film.set(Channel::bounds, x, y, counts[p].z * scale);
+      film.set(Channel::cut_size, x, y, counts_[p].x * scale);
+      film.set(Channel::rays, x, y, counts_[p].y * scale);
+      film.set(Channel::bounds, x, y, counts_[p].z * scale);
     }
   }
 
@@ -104,11 +110,28 @@ class Batch {
   size_t pixel_count() const { return pixels_.size(); }
 
  private:
+  // Chance ends chains long before.
+  static constexpr uint32_t kMaxLevels = 64;
+
+  void add_light(const Integrator& integrator, const ShadePoints& points, ShadeContext context) {
+    if (points.size() == 0) return;
+    std::vector<Rgb> radiance(points.size());
+    std::vector<PointCounts> counts(points.size());
+    integrator.shade(points, radiance, counts, context);
+    for (size_t i = 0; i < points.size(); ++i) {
+      const uint32_t p = points.pixel[i];
+      light_[p] += radiance[i];
+      counts_[p] += Vec3f{static_cast<float>(counts[i].clusters), static_cast<float>(counts[i].rays),
+                          static_cast<float>(counts[i].bounds)};
+    }
+  }
+
   void camera_rays(size_t p, RayHit* rays, float* cosines) const {
     const auto [x, y] = pixels_[p];
     Rng rng(options_.seed, Stage::camera, x, y);
     // One sample lies at the centre; more are shifted by a random vector of the pixel's own.
-    const Vec2f shift = options_.samples == 1 ? Vec2f{0, 0} : Vec2f{rng.next_float(), rng.next_float()};
+    const bool centred = options_.samples == 1 && !options_.jitter;
+    const Vec2f shift = centred ? Vec2f{0, 0} : Vec2f{rng.next_float(), rng.next_float()};
     const Vec2f lens_shift = {rng.next_float(), rng.next_float()};
     for (uint32_t s = 0; s < options_.samples; ++s) {
       const Vec2f at = r2(s, shift), lens = r2(s, lens_shift);
@@ -149,8 +172,8 @@ class Batch {
   std::vector<Pixel> pixels_;
   std::vector<PixelSums> sums_;
   ShadePoints points_;
-  std::vector<Rgb> radiance_;
-  std::vector<PointCounts> counts_;
+  std::vector<Rgb> light_;     // reflected, summed over a pixel's samples
+  std::vector<Vec3f> counts_;  // clusters, rays, bounds
 };
 
 }  // namespace
@@ -178,6 +201,8 @@ void render_frame(const Scene& scene, const Integrator& integrator, const FrameO
     batches.emplace_back(first, last);
     first = last;
   }
+  std::optional<EyeRays> eye_rays;
+  if (options.compensate > 0.0f) eye_rays.emplace(scene, options.compensate, options.seed);
   context.progress.begin("render", size_t{options.crop.width()} * options.crop.height());
   tbb::parallel_for(
       tbb::blocked_range<size_t>(0, batches.size(), 1),
@@ -187,7 +212,7 @@ void render_frame(const Scene& scene, const Integrator& integrator, const FrameO
           Batch batch(scene, options);
           for (size_t t = batches[b].first; t < batches[b].second; ++t) batch.add_tile(tiles[t]);
           batch.collect();
-          batch.shade(integrator, context);
+          batch.shade(integrator, eye_rays ? &*eye_rays : nullptr, context);
           context.progress.check();
           batch.write(film);
           context.progress.advance(batch.pixel_count());

@@ -12,6 +12,8 @@ struct FrameOptions {
   uint32_t width = 0, height = 0, samples = 1, tile_size = 64;
   Rect crop;  // inside width × height
   uint64_t seed = 1;
+  float compensate = 0.0f;  // distance of the clamp whose loss rays bring back; 0: none [integrators/eye_rays.h]
+  bool jitter = false;      // a single sample too lies at random in its pixel
 };
 
 // Tiles of the crop in the order they are rendered.

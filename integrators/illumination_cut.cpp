@@ -42,7 +42,7 @@ struct GroupItem {
 
 // Share of the light that a surface sends back, to first order: what turns irradiance into radiance.
 float reflectance(const SurfacePoint& p) {
-  const float specular = p.ggx() ? specular_albedo(p) * std::numbers::inv_pi_v<float>
+  const float specular = p.ggx() ? luminance(specular_albedo(p)) * std::numbers::inv_pi_v<float>
                                  : luminance(p.specular) * (2.0f / (p.shininess + 1.0f));
   return luminance(p.diffuse) + specular;
 }

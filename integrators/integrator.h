@@ -80,10 +80,14 @@ class Integrator {
                           ShadeContext context);
 };
 
+// Where a method takes light from: virtual lights, or the scene's emitters themselves.
+enum class LightSource { virtual_lights, emitters };
+
 struct IntegratorEntry {
   const char *id, *label, *description, *source;
   std::vector<ParamInfo> (*params)();  // its own; common_params() come first
   std::unique_ptr<Integrator> (*create)();
+  LightSource light_source = LightSource::virtual_lights;
 };
 
 // Of all integrators, in the order of integrator_list.inc.

@@ -102,6 +102,11 @@ std::vector<ParamInfo> common_params() {
       {"clamp_distance", "Clamp distance",
        "No virtual light is taken to be nearer than this; 0: use the relative clamp", "scene units", ParamType::real,
        "0", 0, 1e30},
+      {"compensate", "Compensate",
+       "Rays bring back the light that the clamp takes away, and what glossy surfaces throw on others: no energy is "
+       "lost, "
+       "at the price of noise that passes average out",
+       "", ParamType::boolean, "0"},
   };
 }
 

@@ -216,8 +216,8 @@ class StochasticLightcuts final : public Integrator {
     float reflected = luminance(point.diffuse);
     if (const float specular = luminance(point.specular); point.ggx()) {
       const float nv = dot(point.normal, point.mirror);
-      const float edge = std::max(0.0f, point.grazing - specular) * schlick_share(nv);
-      reflected += (specular + edge) * ggx_lobe_bound(-point.shininess, nv, cosine, best_cosine(point.mirror));
+      reflected +=
+          luminance(specular_albedo(point)) * ggx_lobe_bound(-point.shininess, nv, cosine, best_cosine(point.mirror));
     } else if (specular > 0.0f) {
       const float beta = best_cosine(point.mirror);
       if (beta > 0.0f) reflected += specular * std::pow(beta, point.shininess);

@@ -19,7 +19,7 @@ namespace lumicut::io {
               X(scene_set_environment) X(scene_set_camera) X(scene_set_trace) X(scene_commit) X(get_integrator_info)   \
                   X(get_param_info) X(integrator_create) X(integrator_set) X(integrator_get) X(integrator_set_lights)  \
                       X(integrator_prepare) X(integrator_get_lights) X(integrator_shade) X(get_channel_info)           \
-                          X(render_start) X(render_wait) X(render_next_tile) X(render_read)
+                          X(render_start) X(render_wait) X(render_next_tile) X(render_read) X(render_checkpoint)
 
 struct Api {
 #define LUMICUT_MEMBER(name) decltype(&lumicut_##name) name = nullptr;

@@ -39,7 +39,8 @@ lumicut_result lumicut_render_start(lumicut_integrator integrator, lumicut_scene
     lumicut_integrator_t& i = object(integrator);
     lumicut_scene_t& s = object(scene);
     if (render == nullptr) fail_argument("lumicut_render_start: render is NULL");
-    *render = new lumicut_render_t(i, s, to_frame_options(read(desc)));
+    const lumicut_render_desc d = read(desc);
+    *render = new lumicut_render_t(i, s, to_frame_options(d), to_pass_options(d));
   });
 }
 
@@ -78,5 +79,14 @@ lumicut_result lumicut_render_read(lumicut_render render, const char* channel, c
                     number_text(uint64_t{part.x1}) + ", " + number_text(uint64_t{part.y1}) +
                     ") is not a rectangle inside the crop");
     r.read(c, part, out);
+  });
+}
+
+lumicut_result lumicut_render_checkpoint(lumicut_render render, const void** data, uint64_t* size) {
+  return guard([&] {
+    lumicut_render_t& r = object(render);
+    if (data == nullptr || size == nullptr) fail_argument("lumicut_render_checkpoint: data or size is NULL");
+    const std::vector<uint8_t>& bytes = r.checkpoint();
+    *data = bytes.data(), *size = bytes.size();
   });
 }

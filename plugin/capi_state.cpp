@@ -2,8 +2,8 @@
 #include <cstring>
 #include <limits>
 
-#include "core/rng.h"
 #include "plugin/check.h"
+#include "plugin/hash.h"
 #include "plugin/include/lumicut/lumicut_state.h"
 #include "plugin/objects.h"
 #include "plugin/state.h"
@@ -29,31 +29,6 @@ struct Header {
   uint32_t host_lights, reserved;
 };
 static_assert(sizeof(Header) == 80);
-
-uint64_t hash_bytes(uint64_t seed, const void* data, size_t size) {
-  const auto* bytes = static_cast<const uint8_t*>(data);
-  uint64_t h = hash64(seed ^ size);
-  for (; size >= 8; size -= 8, bytes += 8) {
-    uint64_t word;
-    std::memcpy(&word, bytes, 8);
-    h = (h ^ word) * 0x9e3779b97f4a7c15ull;
-    h ^= h >> 29;
-  }
-  uint64_t word = 0;
-  std::memcpy(&word, bytes, size);
-  return hash64(h ^ word);
-}
-
-template <typename T>
-uint64_t hash_array(uint64_t seed, const std::vector<T>& v) {
-  return hash_bytes(seed, v.data(), v.size() * sizeof(T));
-}
-
-uint64_t geometry_hash(const Scene& scene) {
-  uint64_t h = 1;
-  for (const Mesh& m : scene.meshes()) h = hash_array(hash_array(hash_array(h, m.positions), m.indices), m.instances);
-  return h;
-}
 
 uint64_t checksum(const Header& h, const uint8_t* body, size_t size) {
   const uint64_t fields[] = {h.size,

@@ -409,4 +409,24 @@ FrameOptions to_frame_options(const lumicut_render_desc& in) {
   return o;
 }
 
+PassOptions to_pass_options(const lumicut_render_desc& in) {
+  const Checked c("lumicut_render_desc");
+  c.not_negative("max_seconds", in.max_seconds);
+  c.range("target_error", in.target_error, 0.0f, 1e6f);
+  c.range("confidence", in.confidence, 0.0f, 0.999999f);
+  c.flags("flags", in.flags, LUMICUT_CHECKPOINTS);
+  if (in.checkpoint == nullptr && in.checkpoint_size != 0)
+    c.fail("checkpoint", "is NULL, but checkpoint_size is " + number_text(in.checkpoint_size));
+  PassOptions o;
+  o.max_seconds = in.max_seconds, o.target_error = in.target_error;
+  o.confidence = in.confidence > 0.0f ? in.confidence : 0.95;
+  o.passes = in.passes > 0 ? in.passes : (in.max_seconds > 0.0f || in.target_error > 0.0f ? 0 : 1);
+  o.checkpoints = (in.flags & LUMICUT_CHECKPOINTS) != 0;
+  if (in.checkpoint != nullptr) {
+    const auto* bytes = static_cast<const uint8_t*>(in.checkpoint);
+    o.resume.assign(bytes, bytes + in.checkpoint_size);
+  }
+  return o;
+}
+
 }  // namespace lumicut

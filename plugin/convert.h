@@ -7,6 +7,7 @@
 #include "film/film.h"
 #include "integrators/frame.h"
 #include "plugin/boundary.h"
+#include "plugin/passes.h"
 #include "scene/scene.h"
 #include "vpl/vpl.h"
 
@@ -33,5 +34,6 @@ void check_points(const Scene& scene, const lumicut_point* points, uint64_t coun
 
 // Size, crop, samples and tiles. Fails where the film is larger than the machine's memory.
 FrameOptions to_frame_options(const lumicut_render_desc& in);
+PassOptions to_pass_options(const lumicut_render_desc& in);
 
 }  // namespace lumicut

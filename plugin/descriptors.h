@@ -29,7 +29,7 @@ constexpr bool fields_fill(const FieldSpan (&fields)[N], size_t size) {
 
 LUMICUT_DESCRIPTOR(lumicut_device_desc, F(struct_size), F(abi_major), F(threads), F(verbosity), F(log), F(user));
 LUMICUT_DESCRIPTOR(lumicut_status, F(struct_size), F(state), F(phase), F(fraction), F(seconds), F(tiles_done),
-                   F(tiles_total));
+                   F(tiles_total), F(passes_done), F(passes_total), F(error));
 LUMICUT_DESCRIPTOR(lumicut_accel_desc, F(struct_size), F(robust), F(kind), F(builder), F(positions), F(position_count),
                    F(position_stride), F(indices), F(triangle_count), F(boxes), F(box_count));
 LUMICUT_DESCRIPTOR(lumicut_accel_info, F(struct_size), F(node_count), F(primitive_count), F(bytes), F(build_seconds),
@@ -51,7 +51,9 @@ LUMICUT_DESCRIPTOR(lumicut_trace, F(struct_size), F(batch), F(intersect), F(occl
 LUMICUT_DESCRIPTOR(lumicut_integrator_info, F(struct_size), F(param_count), F(id), F(label), F(description), F(source));
 LUMICUT_DESCRIPTOR(lumicut_param_info, F(struct_size), F(type), F(id), F(label), F(description), F(unit), F(choices),
                    F(default_text), F(minimum), F(maximum));
-LUMICUT_DESCRIPTOR(lumicut_render_desc, F(struct_size), F(width), F(height), F(samples), F(crop), F(tile_size));
+LUMICUT_DESCRIPTOR(lumicut_render_desc, F(struct_size), F(width), F(height), F(samples), F(crop), F(tile_size),
+                   F(passes), F(max_seconds), F(target_error), F(confidence), F(flags), F(checkpoint),
+                   F(checkpoint_size));
 LUMICUT_DESCRIPTOR(lumicut_tile, F(struct_size), F(x0), F(y0), F(x1), F(y1));
 LUMICUT_DESCRIPTOR(lumicut_channel_info, F(struct_size), F(components), F(name), F(description));
 

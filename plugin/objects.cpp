@@ -141,10 +141,10 @@ void lumicut_scene_t::require_committed() const {
   if (changed || camera_changed) fail_state("lumicut_scene: it was changed since its last commit");
 }
 
-void lumicut_integrator_t::prepare(lumicut_scene_t& of, Progress& progress, Stats& into) {
+void lumicut_integrator_t::prepare(lumicut_scene_t& of, const Params& with, Progress& progress, Stats& into) {
   if (of.device.get() != device.get()) fail_argument("lumicut_scene: it belongs to another device than the integrator");
-  const std::string all = params_text(params);
-  const std::string tracing = tracing_key(params);
+  const std::string all = params_text(with);
+  const std::string tracing = tracing_key(with);
   const bool same_scene =
       prepared != nullptr && prepared->scene.get() == &of && prepared->scene_version == of.scene.version();
   const bool same_source = same_scene && prepared->host_lights == host_lights_id;
@@ -159,14 +159,16 @@ void lumicut_integrator_t::prepare(lumicut_scene_t& of, Progress& progress, Stat
   next->params_key = all;
   next->vpls_key = tracing;
   next->host_lights = host_lights_id;
-  next->params = params;
+  next->params = with;
   if (host_lights != nullptr) {
     next->vpls = host_lights;
   } else if (same_source && prepared->vpls_key == tracing) {
     next->vpls = prepared->vpls;
+  } else if (entry.light_source == LightSource::emitters) {
+    next->vpls = std::make_shared<VplSet>();
   } else {
     const PhaseTimer timer(into, "light paths");
-    next->vpls = std::make_shared<VplSet>(trace_vpls(of.scene, vpl_options(params), progress));
+    next->vpls = std::make_shared<VplSet>(trace_vpls(of.scene, vpl_options(with), progress));
   }
   progress.check();
   into.set_value("vpls", static_cast<double>(next->vpls->lights.size()));

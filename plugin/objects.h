@@ -122,7 +122,11 @@ struct lumicut_integrator_t : lumicut::ObjectOf<lumicut_integrator_t> {
 
   // Lights and trees for the scene as it stands; nothing where that was done already. Runs in the device's arena.
   // On failure what was prepared before stands.
-  void prepare(lumicut_scene_t& scene, lumicut::Progress& progress, lumicut::Stats& into);
+  void prepare(lumicut_scene_t& scene, lumicut::Progress& progress, lumicut::Stats& into) {
+    prepare(scene, params, progress, into);
+  }
+  // The same with other parameters than its own: those of one pass.
+  void prepare(lumicut_scene_t& scene, const lumicut::Params& with, lumicut::Progress& progress, lumicut::Stats& into);
 
   lumicut::Ref<lumicut_device_t> device;
   const lumicut::IntegratorEntry& entry;

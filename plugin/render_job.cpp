@@ -10,11 +10,13 @@ namespace {
 uint32_t tiles_across(uint32_t length, uint32_t tile) { return (length + tile - 1) / tile; }
 }  // namespace
 
-lumicut_render_t::lumicut_render_t(lumicut_integrator_t& integrator, lumicut_scene_t& scene, const FrameOptions& o)
+lumicut_render_t::lumicut_render_t(lumicut_integrator_t& integrator, lumicut_scene_t& scene, const FrameOptions& o,
+                                   PassOptions passes)
     : options(o),
       integrator_(integrator),
       scene_(scene),
       film_(o.crop),
+      passes_(std::move(passes)),
       columns_(tiles_across(o.crop.width(), o.tile_size)),
       rows_(tiles_across(o.crop.height(), o.tile_size)),
       done_(size_t{columns_} * rows_) {
@@ -24,6 +26,9 @@ lumicut_render_t::lumicut_render_t(lumicut_integrator_t& integrator, lumicut_sce
   if (!scene.scene.has_camera()) fail_state("lumicut_scene: it has no camera");
   if (scene.device.get() != integrator.device.get())
     fail_argument("lumicut_scene: it belongs to another device than the integrator");
+  if (integrator.host_lights != nullptr && integrator.params.boolean("compensate"))
+    fail_argument(
+        "parameter compensate: only lights that the library traced can be compensated, and the host set its own");
   progress_ = work.begin();
   thread_ = std::thread([this] { run(); });
 }
@@ -54,19 +59,82 @@ void lumicut_render_t::run() noexcept {
   ended_.notify_all();
 }
 
+FrameOptions lumicut_render_t::frame_options(const Prepared& prepared) const {
+  FrameOptions frame = options;
+  frame.seed = static_cast<uint64_t>(prepared.params->integer("seed"));
+  if (prepared.params->boolean("compensate") && integrator_->entry.light_source == LightSource::virtual_lights)
+    frame.compensate = clamp_distance(*prepared.params, scene_->scene);
+  return frame;
+}
+
 void lumicut_render_t::render() {
   stats.set_value("start_bytes", static_cast<double>(resident_memory()));
   progress_->check();
+  if (passes_.progressive()) return render_passes();
   integrator_->prepare(*scene_, *progress_, stats);
   const Prepared& prepared = *integrator_->prepared;
-  FrameOptions frame = options;
-  frame.seed = static_cast<uint64_t>(prepared.params->integer("seed"));
   {
     const PhaseTimer timer(stats, "render");
-    render_frame(scene_->scene, *prepared.method, frame, film_, {*progress_, stats},
+    render_frame(scene_->scene, *prepared.method, frame_options(prepared), film_, {*progress_, stats},
                  [this](const Rect& tile) { tile_done(tile); });
   }
   progress_->check();
+  const std::lock_guard lock(mutex_);
+  passes_done_ = 1;
+}
+
+void lumicut_render_t::render_passes() {
+  PassMean mean(options.crop, passes_.confidence);
+  const uint64_t key =
+      passes_key(scene_->scene, integrator_->entry.id, params_text(integrator_->params), options, passes_.confidence);
+  uint32_t done = 0;
+  double error = std::numeric_limits<double>::infinity(), last_seconds = 0.0;
+  const auto finish_pass = [&] {
+    error = mean.error(film_, done);
+    stats.set_value("passes", done);
+    if (done >= 2) stats.set_value("error", error);
+    std::vector<uint8_t> bytes;
+    if (passes_.checkpoints) bytes = save_passes(key, done, mean, film_);
+    const std::lock_guard lock(mutex_);
+    passes_done_ = done, error_of_passes_ = error;
+    checkpoint_ = std::move(bytes);
+  };
+  if (!passes_.resume.empty()) {
+    done = load_passes(passes_.resume, key, mean, film_);
+    passes_.resume = {};
+    finish_pass();
+    for (uint32_t row = 0; row < rows_; ++row)
+      for (uint32_t column = 0; column < columns_; ++column) tile_done(tile_rect(column, row));
+  }
+  Film pass(options.crop);
+  while (done == 0 || !enough_passes(passes_, done, work.seconds(), last_seconds, error)) {
+    const double start = work.seconds();
+    integrator_->prepare(*scene_, params_of_pass(integrator_->params, done, scene_->scene), *progress_, stats);
+    const Prepared& prepared = *integrator_->prepared;
+    FrameOptions frame = frame_options(prepared);
+    frame.jitter = true;
+    {
+      const PhaseTimer timer(stats, "render");
+      render_frame(scene_->scene, *prepared.method, frame, pass, {*progress_, stats}, [&](const Rect& tile) {
+        {
+          const std::lock_guard lock(film_mutex_);
+          mean.add(pass, tile, uint64_t{done} + 1, film_);
+        }
+        tile_done(tile);
+      });
+    }
+    progress_->check();
+    ++done;
+    last_seconds = work.seconds() - start;
+    finish_pass();
+  }
+}
+
+const std::vector<uint8_t>& lumicut_render_t::checkpoint() {
+  if (!passes_.checkpoints) fail_state("lumicut_render_checkpoint: the render was started without LUMICUT_CHECKPOINTS");
+  const std::lock_guard lock(mutex_);
+  shown_checkpoint_ = checkpoint_;
+  return shown_checkpoint_;
 }
 
 Rect lumicut_render_t::tile_rect(uint32_t column, uint32_t row) const {
@@ -88,7 +156,10 @@ lumicut_status lumicut_render_t::status() const {
   lumicut_status s = work.status();
   const std::lock_guard lock(mutex_);
   s.tiles_done = tiles_done_;
-  s.tiles_total = done_.size();
+  s.passes_done = passes_done_, s.passes_total = passes_.passes;
+  s.error = error_of_passes_;
+  // Of passes without end: those of the pass that runs.
+  s.tiles_total = done_.size() * std::max<uint64_t>(passes_.passes, passes_.passes == 0 ? passes_done_ + 1 : 1);
   return s;
 }
 
@@ -114,6 +185,8 @@ Rect lumicut_render_t::next_tile() {
 void lumicut_render_t::read(const ChannelInfo& channel, const Rect& rect, float* out) {
   const size_t components = channel.components;
   std::fill(out, out + size_t{rect.width()} * rect.height() * components, 0.0f);
+  std::unique_lock lock(film_mutex_, std::defer_lock);
+  if (passes_.progressive()) lock.lock();
   const auto tile_of = [this](uint32_t x, uint32_t origin) { return (x - origin) / options.tile_size; };
   for (uint32_t row = tile_of(rect.y0, options.crop.y0); row <= tile_of(rect.y1 - 1, options.crop.y0); ++row)
     for (uint32_t column = tile_of(rect.x0, options.crop.x0); column <= tile_of(rect.x1 - 1, options.crop.x0);

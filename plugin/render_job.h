@@ -4,17 +4,20 @@
 #include <atomic>
 #include <condition_variable>
 #include <deque>
+#include <limits>
 #include <thread>
 
 #include "film/film.h"
 #include "integrators/frame.h"
 #include "plugin/objects.h"
+#include "plugin/passes.h"
 
 struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
   static constexpr auto kKind = lumicut::HandleKind::render;
 
   // Takes both objects for the length of the render, and starts it. Throws INVALID_STATE where they are in use.
-  lumicut_render_t(lumicut_integrator_t& integrator, lumicut_scene_t& scene, const lumicut::FrameOptions& options);
+  lumicut_render_t(lumicut_integrator_t& integrator, lumicut_scene_t& scene, const lumicut::FrameOptions& options,
+                   lumicut::PassOptions passes);
   // Cancels what runs and waits for it.
   ~lumicut_render_t();
 
@@ -23,6 +26,8 @@ struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
   std::optional<lumicut::Error> wait(uint32_t milliseconds) const;
   // The next tile that is done, once each; x1 = 0 where there is none now.
   lumicut::Rect next_tile();
+  // State after the last whole pass; stays until the next call.
+  const std::vector<uint8_t>& checkpoint();
   // Tiles that are not done yet read as 0.
   void read(const lumicut::ChannelInfo& channel, const lumicut::Rect& rect, float* out);
 
@@ -34,6 +39,8 @@ struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
  private:
   void run() noexcept;
   void render();
+  void render_passes();
+  lumicut::FrameOptions frame_options(const lumicut::Prepared& prepared) const;
   void tile_done(const lumicut::Rect& tile);
   lumicut::Rect tile_rect(uint32_t column, uint32_t row) const;
 
@@ -41,7 +48,8 @@ struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
   lumicut::Ref<lumicut_scene_t> scene_;
   lumicut::Gate::Hold using_integrator_, using_scene_;
   std::shared_ptr<lumicut::Progress> progress_;
-  lumicut::Film film_;
+  lumicut::Film film_;  // of passes: their mean
+  lumicut::PassOptions passes_;
   const uint32_t columns_, rows_;
   std::vector<std::atomic<uint8_t>> done_;  // a tile: its pixels may be read
 
@@ -49,6 +57,10 @@ struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
   mutable std::condition_variable ended_;
   std::deque<lumicut::Rect> tiles_;
   uint64_t tiles_done_ = 0;
+  uint32_t passes_done_ = 0;
+  double error_of_passes_ = std::numeric_limits<double>::infinity();
+  std::vector<uint8_t> checkpoint_, shown_checkpoint_;
+  mutable std::mutex film_mutex_;  // of passes: pixels change while hosts read them
   bool over_ = false;
   lumicut_result result_ = LUMICUT_OK;
   std::string error_;

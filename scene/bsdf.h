@@ -52,10 +52,9 @@ inline float ggx_lobe_bound(float alpha, float nv, float cosine, float beta) {
 }
 
 // Share of the light that the lobe sends back, roughly.
-inline float specular_albedo(const SurfacePoint& p) {
-  const float specular = luminance(p.specular);
-  if (!p.ggx()) return specular * 2.0f * std::numbers::pi_v<float> / (p.shininess + 1.0f);
-  return specular + std::max(0.0f, p.grazing - specular) * schlick_share(dot(p.normal, p.mirror));
+inline Rgb specular_albedo(const SurfacePoint& p) {
+  if (!p.ggx()) return p.specular * (2.0f * std::numbers::pi_v<float> / (p.shininess + 1.0f));
+  return p.specular + max(p.grazing - p.specular, Rgb{}) * schlick_share(dot(p.normal, p.mirror));
 }
 
 // BRDF towards `to_light` (unit), without the cosine. The vector twin is Reflectance in clusters/light_kernel-inl.h.
@@ -65,8 +64,7 @@ inline Rgb reflectance(const SurfacePoint& p, const Vec3f& to_light) {
     const float m = 1.0f - std::max(0.0f, dot(p.normal, to_light));
     f *= 1.0f - p.fade * (m * m) * (m * m);
     const GgxTerms t = ggx_terms(-p.shininess, p.normal, p.mirror, to_light);
-    const float lobe = t.distribution * t.visibility, edge = p.grazing * t.fresnel;
-    f += (p.specular * (1.0f - t.fresnel) + Rgb{edge, edge, edge}) * lobe;
+    f += (p.specular * (1.0f - t.fresnel) + p.grazing * t.fresnel) * (t.distribution * t.visibility);
     return f;
   }
   const float beta = dot(p.mirror, to_light);
@@ -97,14 +95,14 @@ struct BsdfSample {
 class Bsdf {
  public:
   explicit Bsdf(const SurfacePoint& point) : point_(point) {
-    const float diffuse = std::numbers::pi_v<float> * luminance(point.diffuse);
-    const float specular = specular_albedo(point);
-    const float sum = diffuse + specular;
+    const float diffuse = std::numbers::pi_v<float> * luminance(point.diffuse), sum = luminance(albedo());
     diffuse_share_ = sum > 0.0f ? diffuse / sum : 1.0f;
     black_ = !(sum > 0.0f);
   }
 
   bool black() const { return black_; }
+  // Share of the light that the lobes send back, as if none fell below the horizon.
+  Rgb albedo() const { return point_.diffuse * std::numbers::pi_v<float> + specular_albedo(point_); }
 
   float pdf(const Vec3f& direction) const {
     const float cosine = dot(point_.normal, direction);

@@ -296,7 +296,7 @@ void Scene::set_ggx(const Material& material, const GgxColors& colors, const Vec
   p.diffuse = base.scale * ((1.0f - base.fade * (m * m) * (m * m)) * kInvPi);
   p.fade = base.fade;
   p.shininess = -alpha;
-  if (material.alpha() >= kLeastAlpha) p.specular = colors.specular, p.grazing = colors.grazing;
+  if (material.alpha() >= kLeastAlpha) p.specular = colors.specular, p.grazing = Rgb{1, 1, 1} * colors.grazing;
 }
 
 Rgb Scene::diffuse_texel(const Material& m, Vec2f uv) const {
@@ -340,15 +340,18 @@ Rgb Scene::emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const {
   return m.emission_texture < 0 ? m.emission : m.emission * textures_[m.emission_texture].color(hit.uv.x, hit.uv.y);
 }
 
-Rgb Scene::environment_radiance(const Vec3f& direction) const {
-  if (environment_.texture < 0) return environment_.color;
+Vec2f Scene::environment_uv(const Vec3f& direction) const {
   const float* m = environment_.world_to_map;
   const Vec3f d{m[0] * direction.x + m[1] * direction.y + m[2] * direction.z,
                 m[3] * direction.x + m[4] * direction.y + m[5] * direction.z,
                 m[6] * direction.x + m[7] * direction.y + m[8] * direction.z};
-  const float u = 0.5f - std::atan2(d.y, d.x) * (0.5f * kInvPi);
-  const float v = 0.5f + std::atan2(d.z, std::hypot(d.x, d.y)) * kInvPi;
-  return environment_.color * textures_[environment_.texture].color(u, v);
+  return {0.5f - std::atan2(d.y, d.x) * (0.5f * kInvPi), 0.5f + std::atan2(d.z, std::hypot(d.x, d.y)) * kInvPi};
+}
+
+Rgb Scene::environment_radiance(const Vec3f& direction) const {
+  if (environment_.texture < 0) return environment_.color;
+  const Vec2f uv = environment_uv(direction);
+  return environment_.color * textures_[environment_.texture].color(uv.x, uv.y);
 }
 
 }  // namespace lumicut

@@ -111,6 +111,8 @@ class Scene final : private HitFilter {
   Rgb emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const;
   // Radiance of the environment seen along `direction` (unit).
   Rgb environment_radiance(const Vec3f& direction) const;
+  // Where on the map it is seen; u repeats.
+  Vec2f environment_uv(const Vec3f& direction) const;
 
  private:
   // `edges`: from the triangle's first corner to the others. `corners`: its uvs.

@@ -6,8 +6,9 @@ namespace {
 // Every float array of the structure, so that no member function can forget one.
 template <typename Points, typename Fn>
 void for_each_array(Points& p, Fn fn) {
-  for (int k = 0; k < 3; ++k) fn(p.position[k]), fn(p.normal[k]), fn(p.mirror[k]), fn(p.diffuse[k]), fn(p.specular[k]);
-  fn(p.shininess), fn(p.grazing), fn(p.fade);
+  for (int k = 0; k < 3; ++k)
+    fn(p.position[k]), fn(p.normal[k]), fn(p.mirror[k]), fn(p.diffuse[k]), fn(p.specular[k]), fn(p.grazing[k]);
+  fn(p.shininess), fn(p.fade);
 }
 }  // namespace
 
@@ -31,8 +32,9 @@ void ShadePoints::push(const SurfacePoint& p) {
     mirror[k].push_back(p.mirror[k]);
     diffuse[k].push_back(p.diffuse[k]);
     specular[k].push_back(p.specular[k]);
+    grazing[k].push_back(p.grazing[k]);
   }
-  shininess.push_back(p.shininess), grazing.push_back(p.grazing), fade.push_back(p.fade);
+  shininess.push_back(p.shininess), fade.push_back(p.fade);
   pixel.push_back(p.pixel);
   ggx_ = ggx_ || p.ggx();
   glossy_ = glossy_ || p.ggx() || max_component(p.specular) > 0.0f;
@@ -48,7 +50,8 @@ void ShadePoints::finish() {
 
 SurfacePoint ShadePoints::get(size_t i) const {
   const auto at = [i](const std::vector<float>(&a)[3]) { return Vec3f{a[0][i], a[1][i], a[2][i]}; };
-  return {at(position), at(normal), at(mirror), at(diffuse), at(specular), shininess[i], pixel[i], grazing[i], fade[i]};
+  return {at(position), at(normal), at(mirror),  at(diffuse), at(specular),
+          shininess[i], pixel[i],   at(grazing), fade[i]};
 }
 
 }  // namespace lumicut

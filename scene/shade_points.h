@@ -21,15 +21,17 @@ struct SurfacePoint {
   Rgb specular;            // ks · lobe_scale: radiance factor is specular·cosⁿβ·cosθ
   float shininess = 0.0f;  // GGX: −α; `specular` is then the reflectance at normal incidence, F0
   uint32_t pixel = 0;      // points of one pixel lie together
-  float grazing = 0.0f;    // GGX: reflectance at grazing incidence, F90
+  Rgb grazing{};           // GGX: reflectance at grazing incidence, F90
   float fade = 0.0f;       // the diffuse part falls with the light's cosine c as 1 − fade·(1 − c)⁴
 
   bool ggx() const { return shininess < 0.0f; }
+  // All light that it reflects, times `factor`: what a path has lost on its way here.
+  void attenuate(const Rgb& factor) { diffuse *= factor, specular *= factor, grazing *= factor; }
 };
 
 struct ShadePoints {
-  // position, normal, mirror, diffuse, specular: [component][point]
-  std::vector<float> position[3], normal[3], mirror[3], diffuse[3], specular[3], shininess, grazing, fade;
+  // position, normal, mirror, diffuse, specular, grazing: [component][point]
+  std::vector<float> position[3], normal[3], mirror[3], diffuse[3], specular[3], grazing[3], shininess, fade;
   std::vector<uint32_t> pixel;
 
   size_t size() const { return size_; }

@@ -32,10 +32,11 @@ namespace {
 
 struct Options : RenderSetup {
   Options() { integrator = "lightcuts"; }
-  std::string scene, output, png, stats, vpl_in, vpl_out, size, crop, layers, heat_maps;
-  uint32_t samples = 0, squares = 0;
+  std::string scene, output, png, stats, vpl_in, vpl_out, size, crop, layers, heat_maps, checkpoint;
+  uint32_t samples = 0, squares = 0, passes = 0;
+  double seconds = 0, target_error = 0, confidence = 0;
   int verbosity = 1;
-  bool quiet = false, half = false;
+  bool quiet = false, half = false, resume = false;
   float exposure = 0;
 };
 
@@ -233,6 +234,15 @@ class RenderCommand {
     desc_.height = size_.empty() ? data.height : size_[1];
     desc_.samples = o_.samples > 0 ? o_.samples : data.samples;
     for (size_t i = 0; i < crop_.size(); ++i) desc_.crop[i] = crop_[i];
+    desc_.passes = o_.passes;
+    desc_.max_seconds = static_cast<float>(o_.seconds);
+    desc_.target_error = static_cast<float>(o_.target_error);
+    desc_.confidence = static_cast<float>(o_.confidence);
+    if (!o_.checkpoint.empty()) desc_.flags |= LUMICUT_CHECKPOINTS;
+    if (o_.resume && std::filesystem::exists(o_.checkpoint)) {
+      resumed_ = io::read_whole_file(o_.checkpoint);
+      desc_.checkpoint = resumed_.data(), desc_.checkpoint_size = resumed_.size();
+    }
     if (!crop_.empty() &&
         (crop_[0] >= crop_[2] || crop_[1] >= crop_[3] || crop_[2] > desc_.width || crop_[3] > desc_.height))
       throw UsageError(fmt::format("--crop {}: is not a part of {} x {} pixels", o_.crop, desc_.width, desc_.height));
@@ -312,15 +322,41 @@ class RenderCommand {
     do {
       status.struct_size = sizeof(status);
       result = api().render_wait(render, 100, &status);
+      keep_checkpoint(render, status);
       if (result == LUMICUT_OK)
         bar_.show(
-            status.phase ? status.phase : "",
+            phase_text(status),
             count == 1 ? status.fraction : (static_cast<double>(index) + status.fraction) / static_cast<double>(count),
             status.seconds);
     } while (result == LUMICUT_OK && (status.state == LUMICUT_RUNNING || status.state == LUMICUT_IDLE));
     watcher_.watch(nullptr);
     stop_if_interrupted();
-    io::check(api(), result, "render");
+    io::check(api(), result, resumed_.empty() ? "render" : o_.checkpoint);
+  }
+
+  std::string phase_text(const lumicut_status& status) const {
+    const std::string phase = status.phase ? status.phase : "";
+    if (!progressive()) return phase;
+    const std::string error = std::isfinite(status.error) ? fmt::format(", error {:.2g} %", 100 * status.error) : "";
+    return status.passes_total > 0
+               ? fmt::format("pass {}/{}{}, {}", status.passes_done + 1, status.passes_total, error, phase)
+               : fmt::format("pass {}{}, {}", status.passes_done + 1, error, phase);
+  }
+
+  bool progressive() const { return o_.passes > 1 || o_.seconds > 0 || o_.target_error > 0 || !o_.checkpoint.empty(); }
+
+  // What a killed render goes on from: written beside, then renamed, after each pass (on the disk at most every few
+  // seconds), and after the last.
+  void keep_checkpoint(lumicut_render render, const lumicut_status& status) {
+    if (o_.checkpoint.empty() || status.passes_done == kept_passes_) return;
+    const bool over = status.state != LUMICUT_RUNNING;
+    if (!over && kept_passes_ > 0 && now() - kept_time_ < 2.0) return;
+    const void* data = nullptr;
+    uint64_t size = 0;
+    io::check(api(), api().render_checkpoint(render, &data, &size), o_.checkpoint);
+    if (size == 0) return;
+    io::write_whole_file(o_.checkpoint, std::string(static_cast<const char*>(data), size));
+    kept_passes_ = status.passes_done, kept_time_ = now();
   }
 
   // The part's own statistics; of squares the sums, and seconds by the wall.
@@ -440,6 +476,9 @@ class RenderCommand {
   std::vector<uint32_t> size_, crop_;
   lumicut_render_desc desc_{};
   uint64_t triangles_ = 0;
+  std::string resumed_;  // bytes of --checkpoint
+  uint32_t kept_passes_ = 0;
+  double kept_time_ = 0;
   double read_seconds_ = 0, commit_seconds_ = 0, squares_seconds_ = 0;
 };
 
@@ -469,6 +508,23 @@ void add_render(CLI::App& app) {
           "Render only so many squares of 32 pixels, spread over the image; others are not numbers (EXR alone)")
       ->check(CLI::Range(1, 1 << 24))
       ->excludes("--crop");
+  command
+      ->add_option("--passes", o->passes,
+                   "Average so many images, each with virtual lights of its own (0: until --seconds or --target-error; "
+                   "else 1)")
+      ->check(CLI::Range(0u, 1u << 30));
+  command->add_option("--seconds", o->seconds, "Stop after the pass that ends nearest to this")
+      ->check(CLI::NonNegativeNumber);
+  command
+      ->add_option("--target-error", o->target_error,
+                   "Stop when the error is known to this share, such as 0.02: of --confidence of the pixels, at "
+                   "--confidence (after at least 8 passes)")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--confidence", o->confidence, "Of the intervals in the layer `error` (default: 0.95)")
+      ->check(CLI::Range(0.5, 0.999));
+  auto* checkpoint =
+      command->add_option("--checkpoint", o->checkpoint, "File that a stopped or killed render goes on from");
+  command->add_flag("--resume", o->resume, "Go on from --checkpoint, if it is there")->needs(checkpoint);
   command->add_option("--heat-map", o->heat_maps,
                       "Folder for false-colour PNGs of what a point cost: bounds, cut_size, rays");
   command->add_option("--vpl-in", o->vpl_in, "Take the virtual lights from this file");
@@ -484,6 +540,8 @@ void add_render(CLI::App& app) {
   command->callback([o] {
     if (o->output.empty() && o->png.empty() && o->stats.empty() && o->vpl_out.empty() && o->heat_maps.empty())
       throw UsageError("render: nothing to write; give -o out.exr, --png, --stats, --heat-map or --vpl-out");
+    if (o->squares > 0 && (o->passes > 1 || o->seconds > 0 || o->target_error > 0 || !o->checkpoint.empty()))
+      throw UsageError("render: --squares renders one pass");
     catch_interrupts();
     RenderCommand(*o).run();
   });

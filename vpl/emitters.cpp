@@ -150,10 +150,11 @@ Emitters::Emitters(const Scene& scene) : scene_(scene) {
                      ? luminance(env.color) * texels_.total() * 2 * std::numbers::pi * std::numbers::pi / weights.size()
                      : 0.0;
     }
-    add({Kind::environment, 0, 0, 0}, world_area * integral, true);
+    environment_power_ = world_area * integral;
+    add({Kind::environment, 0, 0, 0}, environment_power_, true);
   }
 
-  std::vector<Rgb> texture_mean(scene.textures().size(), Rgb{-1, 0, 0});
+  texture_mean_.assign(scene.textures().size(), Rgb{-1, 0, 0});
   for (uint32_t m = 0; m < scene.meshes().size(); ++m) {
     const Mesh& mesh = scene.meshes()[m];
     for (uint32_t t = 0; t < mesh.triangle_count(); ++t) {
@@ -161,7 +162,7 @@ Emitters::Emitters(const Scene& scene) : scene_(scene) {
       if (!material.emissive()) continue;
       Rgb emission = material.emission;
       if (material.emission_texture >= 0) {
-        Rgb& mean = texture_mean[material.emission_texture];
+        Rgb& mean = texture_mean_[material.emission_texture];
         if (mean.x < 0.0f) mean = scene.textures()[material.emission_texture].average();
         emission = emission * mean;
       }
@@ -246,34 +247,82 @@ Vec3f Emitters::sample_sun(const Light& light, Rng& rng) const {
   return Frame(light.direction).to_world(uniform_cone(std::cos(light.radius), rng.next_float(), rng.next_float()));
 }
 
-Vpl Emitters::sample_direct(double u, uint64_t count, Rng& rng) const {
+DirectSample Emitters::sample_direct(double u, uint64_t count, Rng& rng) const {
   const size_t i = extended_power_.sample(u);
   const Emitter& e = extended_[i];
-  const auto weight = static_cast<float>(1.0 / (extended_power_.pmf(i) * static_cast<double>(count)));
-  Vpl v;
+  const double share = extended_power_.pmf(i);
+  const auto weight = static_cast<float>(1.0 / (share * static_cast<double>(count)));
+  DirectSample s;
+  Vpl& v = s.vpl;
   if (e.kind == Kind::sun) {
     const Light& l = scene_.lights()[e.index];
     v.kind = VplKind::directional, v.normal = sample_sun(l, rng), v.intensity = l.value * weight, v.group = l.group;
-    return v;
-  }
-  if (e.kind == Kind::environment) {
+  } else if (e.kind == Kind::environment) {
     Rgb radiance;
     float pdf;
     v.kind = VplKind::directional;
     v.normal = -sample_environment(rng, radiance, pdf);
     v.intensity = radiance * (weight / pdf);
     v.group = scene_.environment().group;
-    return v;
+    s.seen_by_rays = true, s.density = share * pdf;
+  } else {
+    float area_pdf;
+    v = surface_light(e, weight, rng, area_pdf);
+    s.seen_by_rays = e.kind == Kind::triangle, s.density = share * area_pdf;
   }
+  return s;
+}
+
+Vpl Emitters::surface_light(const Emitter& e, float weight, Rng& rng, float& area_pdf) const {
   const Surface s = sample_surface(e, rng);
+  area_pdf = s.area_pdf;
   const uint32_t group = e.kind == Kind::triangle ? scene_.meshes()[e.index].group : scene_.lights()[e.index].group;
-  v = oriented(s.position, s.normal, s.radiance * (weight / s.area_pdf), group);
+  Vpl v = oriented(s.position, s.normal, s.radiance * (weight / s.area_pdf), group);
   if (e.kind != Kind::triangle && narrowed(scene_.lights()[e.index])) {
     const Vpl profile = spread_profile(scene_.lights()[e.index]);
     v.kind = VplKind::spot, v.spot_cosine = profile.spot_cosine, v.spread_tan = profile.spread_tan;
     v.intensity = v.intensity * profile.intensity;
   }
   return v;
+}
+
+Vpl Emitters::sample_lamp(uint32_t lamp, Rng& rng) const {
+  const Light& l = scene_.lights()[lamp];
+  if (l.type == LightType::spot) return spot_of(l);
+  if (l.type == LightType::point && !(l.radius > 0.0f)) {
+    Vpl v;
+    v.position = l.position, v.intensity = l.value, v.group = l.group;
+    return v;
+  }
+  const Kind kind =
+      l.type == LightType::point ? Kind::sphere : (l.type == LightType::disk ? Kind::disk : Kind::rectangle);
+  float area_pdf;
+  return surface_light({kind, lamp, 0, 0}, 1.0f, rng, area_pdf);
+}
+
+double Emitters::mesh_density(const SurfaceHit& surface) const {
+  const Material& material = scene_.materials()[surface.material];
+  if (!material.emissive() || !has_extended()) return 0.0;
+  Rgb emission = material.emission;
+  if (material.emission_texture >= 0) emission = emission * texture_mean_[material.emission_texture];
+  // The area of the triangle, and the side where both emit, cancel.
+  return std::numbers::pi * luminance(emission) / extended_power_.total();
+}
+
+double Emitters::environment_density(const Vec3f& towards) const {
+  if (!(environment_power_ > 0.0)) return 0.0;
+  const double share = environment_power_ / extended_power_.total();
+  const Environment& env = scene_.environment();
+  if (env.texture < 0) return share * 0.25 / std::numbers::pi;
+  const Texture& t = scene_.textures()[env.texture];
+  const Vec2f uv = scene_.environment_uv(towards);
+  const auto texel = [](double at, uint32_t count) {
+    return static_cast<uint32_t>(std::clamp(at * count, 0.0, static_cast<double>(count) - 1));
+  };
+  const uint32_t x = texel(uv.x - std::floor(uv.x), t.width()), y = texel(1.0 - uv.y, t.height());
+  const double elevation = (uv.y - 0.5) * std::numbers::pi;
+  return share * texels_.pmf(size_t{y} * t.width() + x) * static_cast<double>(texels_.size()) /
+         (2.0 * std::numbers::pi * std::numbers::pi * std::max(1e-6, std::cos(elevation)));
 }
 
 EmittedRay Emitters::distant_ray(const Vec3f& travel, const Rgb& irradiance, Rng& rng) const {

@@ -33,6 +33,13 @@ struct EmittedRay {
   uint32_t group = 0;
 };
 
+// A virtual light that stands for extended emitters.
+struct DirectSample {
+  Vpl vpl;
+  bool seen_by_rays = false;  // an emissive mesh or the environment; lamps are invisible
+  double density = 0.0;       // of those: for each unit of area, or for each steradian of the environment
+};
+
 class Emitters {
  public:
   explicit Emitters(const Scene& scene);
@@ -43,8 +50,14 @@ class Emitters {
   // True where some emitter has extent, and so needs many VPLs for its direct light.
   bool has_extended() const { return !extended_power_.empty(); }
   // One of `count` VPLs that stand for the extended emitters' direct light; `u` in [0,1) chooses the emitter by power.
-  Vpl sample_direct(double u, uint64_t count, Rng& rng) const;
+  DirectSample sample_direct(double u, uint64_t count, Rng& rng) const;
   EmittedRay sample_ray(Rng& rng) const;
+  // A lamp of the scene (no sun) as one virtual light: a sample of where it emits, exact where it has no extent.
+  Vpl sample_lamp(uint32_t lamp, Rng& rng) const;
+  // Density with which sample_direct (of a count of 1) draws a place on an emissive mesh, for each unit of area, and a
+  // direction towards the environment, for each steradian.
+  double mesh_density(const SurfaceHit& surface) const;
+  double environment_density(const Vec3f& towards) const;
 
  private:
   enum class Kind : uint8_t { point, spot, sphere, rectangle, disk, sun, environment, triangle };
@@ -62,6 +75,8 @@ class Emitters {
 
   void add(const Emitter& e, double power, bool extended);
   Surface sample_surface(const Emitter& e, Rng& rng) const;
+  // A sample as a virtual light that stands for `weight` of the emitter.
+  Vpl surface_light(const Emitter& e, float weight, Rng& rng, float& area_pdf) const;
   // Direction towards the environment, its radiance and density per steradian.
   Vec3f sample_environment(Rng& rng, Rgb& radiance, float& pdf) const;
   // Direction in which light of a sun travels.
@@ -76,6 +91,8 @@ class Emitters {
   std::vector<Vpl> delta_;
   // Environment: density over texels, rows weighted by the sine of the polar angle.
   DiscreteDistribution texels_;
+  double environment_power_ = 0.0;
+  std::vector<Rgb> texture_mean_;  // of those that emit
 };
 
 }  // namespace lumicut

@@ -37,9 +37,7 @@ bool scatter_ggx(const Scene& scene, const SurfaceHit& surface, const SurfacePoi
   const float lobe = path.rng.next_float();
   const auto followed = follow(scene, surface, wo, lobe, u, v);
   const float qf = followed ? std::min(1.0f, max_component(followed->weight)) : 0.0f;
-  const float edge =
-      std::max(0.0f, point.grazing - max_component(point.specular)) * schlick_share(dot(point.normal, point.mirror));
-  const float qs = std::min(1.0f, max_component(point.diffuse) / kInvPi + max_component(point.specular) + edge);
+  const float qs = std::min(1.0f, max_component(Bsdf(point).albedo()));
   const float survive = std::min(1.0f, qf + qs);
   if (!(choice < survive)) return false;
   const float p_followed = survive * qf / (qf + qs);
@@ -196,8 +194,9 @@ VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progr
     for (uint64_t i = 0; i < direct; ++i) {
       if (i % 4096 == 0) progress.check();
       Rng rng(options.seed, Stage::light_path, i, 1);
-      const Vpl v = emitters.sample_direct((static_cast<double>(i) + rng.next_float()) / static_cast<double>(direct),
-                                           direct, rng);
+      const Vpl v =
+          emitters.sample_direct((static_cast<double>(i) + rng.next_float()) / static_cast<double>(direct), direct, rng)
+              .vpl;
       if (max_component(v.intensity) > 0.0f && is_finite(v.intensity)) set.lights.push_back(v);
     }
     progress.advance(direct);

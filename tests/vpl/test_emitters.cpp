@@ -76,7 +76,7 @@ TEST(Emitters, DirectVplsGiveTheIrradianceOfADiskOnItsAxis) {
   constexpr int kCount = 20000;
   for (int i = 0; i < kCount; ++i) {
     Rng rng(1, Stage::test, i);
-    const Vpl v = emitters.sample_direct((i + rng.next_float()) / kCount, kCount, rng);
+    const Vpl v = emitters.sample_direct((i + rng.next_float()) / kCount, kCount, rng).vpl;
     const double d2 = length2(v.position), c = v.position.z / std::sqrt(d2);
     EXPECT_LT(v.normal.z, -0.999f);
     irradiance += v.intensity.x * c * c / d2;
@@ -96,7 +96,7 @@ TEST(Emitters, ConstantEnvironmentGivesPiTimesItsRadianceAsIrradiance) {
   constexpr int kCount = 50000;
   for (int i = 0; i < kCount; ++i) {
     Rng rng(1, Stage::test, i);
-    const Vpl v = emitters.sample_direct((i + 0.5) / kCount, kCount, rng);
+    const Vpl v = emitters.sample_direct((i + 0.5) / kCount, kCount, rng).vpl;
     up += v.intensity.x * std::max(0.0f, -v.normal.z);
   }
   EXPECT_NEAR(up / (kPi * 2), 1.0, 0.02);  // spread of max(0, cos) over the sphere: 0.5 %
@@ -129,7 +129,7 @@ TEST(Emitters, ImageEnvironmentIsSampledWithoutBias) {
   constexpr int kCount = 50000;
   for (int i = 0; i < kCount; ++i) {
     Rng rng(1, Stage::test, i);
-    const Vpl v = emitters.sample_direct((i + 0.5) / kCount, kCount, rng);
+    const Vpl v = emitters.sample_direct((i + 0.5) / kCount, kCount, rng).vpl;
     got += v.intensity.x * std::max(0.0f, -dot(n, v.normal));
   }
   EXPECT_NEAR(got / expected, 1.0, 0.03);  // uniform side: 0.6 % spread; importance side: 0.5 %

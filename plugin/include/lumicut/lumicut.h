@@ -32,7 +32,7 @@ extern "C" {
 #endif
 
 #define LUMICUT_ABI_MAJOR 1
-#define LUMICUT_ABI_MINOR 0
+#define LUMICUT_ABI_MINOR 1
 #define LUMICUT_FOREVER 0xffffffffu /* milliseconds */
 
 typedef int32_t lumicut_result;
@@ -74,6 +74,10 @@ typedef struct lumicut_status {
   double seconds;      /* since the work began */
   uint64_t tiles_done; /* renders alone */
   uint64_t tiles_total;
+  uint32_t passes_done;  /* renders alone: whole passes */
+  uint32_t passes_total; /* 0: until stopped */
+  double error;          /* `confidence` of the pixels have a half interval of at most this share of their luminance (of a
+                            tenth of the image's mean where that is larger); infinite before two passes */
 } lumicut_status;
 enum { LUMICUT_IDLE = 0, LUMICUT_RUNNING = 1, LUMICUT_DONE = 2, LUMICUT_STOPPED = 3, LUMICUT_FAILED = 4 };
 
@@ -323,7 +327,17 @@ typedef struct lumicut_render_desc {
   uint32_t samples;   /* a pixel; 0: 1. One sample lies at the pixel's centre */
   uint32_t crop[4];   /* x0, y0, x1, y1, row 0 on top; all 0: the whole */
   uint32_t tile_size; /* 0: 64 */
+  uint32_t passes;    /* whole images, each with virtual lights and samples of its own, averaged; 0: until stopped by what
+                         follows, or 1 where nothing follows. Without `compensate` the clamp shrinks from pass to pass */
+  float max_seconds;  /* stop after the pass that comes nearest to this; 0: never */
+  float target_error; /* stop after at least 8 passes, when lumicut_status.error is at most this; 0: never */
+  float confidence;   /* of the interval in the channel `error`; 0: 0.95 */
+  uint32_t flags;     /* LUMICUT_CHECKPOINTS: keep what lumicut_render_checkpoint shows */
+  const void* checkpoint; /* go on from there: scene, integrator, parameters and the fields above but the stops must be the
+                             same, and so is the image, bit for bit. NULL: begin */
+  uint64_t checkpoint_size;
 } lumicut_render_desc;
+enum { LUMICUT_CHECKPOINTS = 1 };
 
 typedef struct lumicut_tile {
   uint32_t struct_size;
@@ -341,7 +355,9 @@ LUMICUT_API lumicut_result lumicut_get_channel_info(uint32_t index, lumicut_chan
 LUMICUT_API lumicut_result lumicut_render_start(lumicut_integrator integrator, lumicut_scene scene, const lumicut_render_desc* desc, lumicut_render* render); /* [object] both */
 LUMICUT_API lumicut_result lumicut_render_wait(lumicut_render render, uint32_t milliseconds, lumicut_status* status); /* [any] returns when done or after that time (0: at once, LUMICUT_FOREVER); a failed render's error comes back here. status may be NULL */
 LUMICUT_API lumicut_result lumicut_render_next_tile(lumicut_render render, lumicut_tile* tile); /* [object] finished tiles, each once; x1 = 0: none now */
-LUMICUT_API lumicut_result lumicut_render_read(lumicut_render render, const char* channel, const lumicut_tile* rect, float* out); /* [any] rect NULL: the crop; rows packed from the top; tiles not done yet are 0 */
+LUMICUT_API lumicut_result lumicut_render_read(lumicut_render render, const char* channel, const lumicut_tile* rect, float* out); /* [any] rect NULL: the crop; rows packed from the top; tiles not done yet are 0; later passes refine */
+/* State after the last whole pass, for lumicut_render_desc.checkpoint; size 0: none yet. */
+LUMICUT_API lumicut_result lumicut_render_checkpoint(lumicut_render render, const void** data, uint64_t* size); /* [object] view */
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,76 @@
+#include "film/pass_mean.h"
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cstring>
+#include <limits>
+
+namespace lumicut {
+
+double student_t(double confidence, uint64_t n) {
+  const boost::math::students_t_distribution<double> t(static_cast<double>(n - 1));
+  return boost::math::quantile(t, 0.5 + 0.5 * confidence);
+}
+
+PassMean::PassMean(const Rect& crop, double confidence)
+    : crop_(crop), confidence_(confidence), sums_(size_t{crop.width()} * crop.height()) {}
+
+void PassMean::add(const Film& pass, const Rect& rect, uint64_t passes, Film& mean) {
+  const auto n = static_cast<double>(passes);
+  const auto share = static_cast<float>(1.0 / n);
+  const double spread = passes < 2 ? 0.0 : student_t(confidence_, passes) / std::sqrt(n * (n - 1.0));
+  for (uint32_t y = rect.y0; y < rect.y1; ++y)
+    for (uint32_t x = rect.x0; x < rect.x1; ++x) {
+      Sums& s = sums_[index(x, y)];
+      const float* radiance = pass.pixel(Channel::radiance, x, y);
+      const double value = luminance(Rgb{radiance[0], radiance[1], radiance[2]});
+      const double away = value - s.mean;
+      s.mean += away / n;
+      s.squares += away * (value - s.mean);
+      for (int k = 0; k < 3; ++k) s.radiance[k] += radiance[k];
+      for (const ChannelInfo& c : channel_table()) {
+        float* out = mean.pixel(c.channel, x, y);
+        if (c.channel == Channel::radiance) {
+          for (int k = 0; k < 3; ++k) out[k] = static_cast<float>(s.radiance[k] / n);
+        } else if (c.channel == Channel::error) {
+          *out = static_cast<float>(spread * std::sqrt(std::max(0.0, s.squares)));
+        } else {
+          const bool first = c.channel == Channel::depth || c.channel == Channel::position;
+          const float* in = pass.pixel(c.channel, x, y);
+          for (uint32_t k = 0; k < c.components; ++k)
+            if (passes == 1 || !first) out[k] += (in[k] - out[k]) * share;
+        }
+      }
+    }
+}
+
+double PassMean::error(const Film& mean, uint64_t passes) const {
+  if (passes < 2) return std::numeric_limits<double>::infinity();
+  double total = 0.0;
+  for (const Sums& s : sums_) total += s.mean;
+  const double least = 0.1 * total / static_cast<double>(sums_.size());
+  std::vector<double> shares;
+  shares.reserve(sums_.size());
+  for (uint32_t y = crop_.y0; y < crop_.y1; ++y)
+    for (uint32_t x = crop_.x0; x < crop_.x1; ++x) {
+      const double half = *mean.pixel(Channel::error, x, y), level = std::max(sums_[index(x, y)].mean, least);
+      shares.push_back(half > 0.0 ? half / level : 0.0);
+    }
+  const auto at = std::min(shares.size() - 1, static_cast<size_t>(confidence_ * static_cast<double>(shares.size())));
+  std::nth_element(shares.begin(), shares.begin() + static_cast<ptrdiff_t>(at), shares.end());
+  return shares[at];
+}
+
+void PassMean::save(std::vector<uint8_t>& out) const {
+  const size_t start = out.size(), bytes = sums_.size() * sizeof(Sums);
+  out.resize(start + bytes);
+  std::memcpy(out.data() + start, sums_.data(), bytes);
+}
+
+bool PassMean::load(std::span<const uint8_t> bytes) {
+  if (bytes.size() != sums_.size() * sizeof(Sums)) return false;
+  std::memcpy(sums_.data(), bytes.data(), bytes.size());
+  return true;
+}
+
+}  // namespace lumicut

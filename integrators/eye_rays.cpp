@@ -1,0 +1,80 @@
+#include "integrators/eye_rays.h"
+
+#include <bit>
+
+#include "scene/bsdf.h"
+
+namespace lumicut {
+
+EyeRays::EyeRays(const Scene& scene, float distance, uint64_t seed)
+    : scene_(scene), distance_(distance), seed_(seed), emitters_(scene), lamps_(scene, emitters_, distance) {}
+
+Rng EyeRays::rng_of(const SurfacePoint& point, uint32_t level) const {
+  const Vec3f at = (point.position - scene_.bounds().lo) / scene_.radius();
+  const auto word = [](float a, float b) {
+    return static_cast<uint64_t>(std::bit_cast<uint32_t>(a)) << 32 | std::bit_cast<uint32_t>(b);
+  };
+  return {hash64(seed_, level), Stage::eye_ray, word(at.x, at.y), word(at.z, point.normal.x + point.mirror.x)};
+}
+
+void EyeRays::near_lamps(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, std::vector<Rgb>& light,
+                         std::vector<uint32_t>& pixels) const {
+  lamps_.for_each_share(point, rng, [&](const Vpl& vpl, const Rgb& lost) {
+    Ray ray;
+    ray.org = point.position, ray.dir = vpl.position - point.position;
+    ray.tnear = 0.0f, ray.tfar = 1.0f;
+    shadows.push_back(ray), light.push_back(lost), pixels.push_back(point.pixel);
+  });
+}
+
+EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& counters) const {
+  EyeHits hits;
+  std::vector<RayHit> rays;
+  std::vector<Rgb> weights;
+  std::vector<uint32_t> pixels;
+  std::vector<Rng> rngs;
+  std::vector<Ray> shadows;
+  for (size_t i = 0; i < points.size(); ++i) {
+    const SurfacePoint point = points.get(i);
+    Rng rng = rng_of(point, level);
+    if (!lamps_.empty()) near_lamps(point, rng, shadows, hits.light, hits.pixel);
+    const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float();
+    const BsdfSample s = Bsdf(point).sample(choice, u, v);
+    if (!(s.pdf > 0.0f) || !is_finite(s.weight)) continue;
+    RayHit ray;
+    ray.ray.org = point.position, ray.ray.dir = s.direction;
+    rays.push_back(ray), weights.push_back(s.weight), pixels.push_back(point.pixel), rngs.push_back(rng);
+  }
+  if (!shadows.empty()) {
+    scene_.accel().occluded(shadows);
+    for (size_t i = 0; i < shadows.size(); ++i)
+      if (shadows[i].tfar < 0.0f) hits.light[i] = {};
+  }
+  if (!rays.empty()) scene_.accel().intersect(rays);
+  counters.rays += shadows.size() + rays.size();
+  for (size_t i = 0; i < rays.size(); ++i) {
+    // A ray that meets its own surface at once left it below the horizon of the triangle.
+    if (rays[i].hit.geom == kNoId || rays[i].ray.tfar < 4.0f * scene_.epsilon()) continue;
+    const SurfaceHit surface = scene_.surface(rays[i]);
+    const Vec3f to_viewer = -rays[i].ray.dir;
+    const float share = rays[i].ray.tfar / distance_, lost = std::max(0.0f, 1.0f - share * share);
+    if (lost > 0.0f) {
+      const Rgb emitted = scene_.emitted(surface, to_viewer);
+      if (max_component(emitted) > 0.0f)
+        hits.light.push_back(emitted * weights[i] * lost), hits.pixel.push_back(pixels[i]);
+    }
+    SurfacePoint point = scene_.shade_point(surface, to_viewer, pixels[i]);
+    point.diffuse = point.diffuse * lost;
+    // Chance decides by what the surface still shows, so that few points cost a whole sum of lights.
+    const Rgb shown = Bsdf(point).albedo() * weights[i];
+    const float survive = std::min(1.0f, max_component(shown));
+    if (!(rngs[i].next_float() < survive)) continue;
+    const Rgb factor = weights[i] / survive;
+    point.attenuate(factor);
+    hits.points.push(point);
+  }
+  hits.points.finish();
+  return hits;
+}
+
+}  // namespace lumicut

@@ -1,0 +1,42 @@
+// Rays that leave the points of a frame, and bring what virtual lights cannot: the light that the clamp takes away.
+// [Kollig, Keller 2004: weight 1 − min(G, b)/G; here with the clamp's d²/c²] And the light that a glossy surface throws
+// on another: virtual lights stand for what is reflected evenly, whatever the direction.
+#pragma once
+
+#include <memory>
+
+#include "core/stats.h"
+#include "integrators/near_lamps.h"
+#include "scene/scene.h"
+
+namespace lumicut {
+
+// Points that rays found, with what they show already multiplied in: their radiance adds to their pixels.
+struct EyeHits {
+  ShadePoints points;
+  std::vector<Rgb> light;       // emitted towards the ray
+  std::vector<uint32_t> pixel;  // of each entry of `light`
+};
+
+class EyeRays {
+ public:
+  // `distance`: that of the clamp, above 0. Scene outlives this.
+  EyeRays(const Scene& scene, float distance, uint64_t seed);
+
+  // One ray from each point (unless it is cut short by chance, or the point is black), and one sample of each near
+  // lamp. `level` counts the surfaces since the camera. Deterministic: numbers belong to the places of points.
+  EyeHits trace(const ShadePoints& points, uint32_t level, Counters& counters) const;
+
+ private:
+  Rng rng_of(const SurfacePoint& point, uint32_t level) const;
+  void near_lamps(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, std::vector<Rgb>& light,
+                  std::vector<uint32_t>& pixels) const;
+
+  const Scene& scene_;
+  const float distance_;
+  const uint64_t seed_;
+  Emitters emitters_;
+  NearLamps lamps_;
+};
+
+}  // namespace lumicut

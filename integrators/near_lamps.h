@@ -1,0 +1,51 @@
+// Lamps that are near a point: what the clamp takes from them is given back by sampling them. They are invisible, so no
+// ray finds them.
+#pragma once
+
+#include <unordered_map>
+#include <vector>
+
+#include "scene/shade_points.h"
+#include "vpl/emitters.h"
+
+namespace lumicut {
+
+class NearLamps {
+ public:
+  // `distance`: that of the clamp, above 0.
+  NearLamps(const Scene& scene, const Emitters& emitters, float distance);
+  bool empty() const { return lamps_.empty(); }
+
+  // What one sample of each near lamp gives the point beyond its clamped light, before visibility: fn(vpl, radiance).
+  template <typename Fn>
+  void for_each_share(const SurfacePoint& point, Rng& rng, Fn&& fn) const {
+    for (uint32_t i : large_) share(i, point, rng, fn);
+    if (cells_.empty()) return;
+    const auto found = cells_.find(key(cell(point.position)));
+    if (found == cells_.end()) return;
+    for (uint32_t i : found->second) share(i, point, rng, fn);
+  }
+
+ private:
+  struct Cell {
+    int64_t x, y, z;
+  };
+  Cell cell(const Vec3f& p) const;
+  static uint64_t key(const Cell& c);
+  template <typename Fn>
+  void share(uint32_t lamp, const SurfacePoint& point, Rng& rng, Fn&& fn) const {
+    const Vpl vpl = emitters_.sample_lamp(lamps_[lamp], rng);
+    const Rgb lost = lost_light(vpl, point);
+    if (max_component(lost) > 0.0f) fn(vpl, lost);
+  }
+  Rgb lost_light(const Vpl& vpl, const SurfacePoint& point) const;
+
+  const Scene& scene_;
+  const Emitters& emitters_;
+  float distance_;
+  std::vector<uint32_t> lamps_;  // of the scene
+  std::vector<uint32_t> large_;  // of lamps_: near everywhere
+  std::unordered_map<uint64_t, std::vector<uint32_t>> cells_;
+};
+
+}  // namespace lumicut

@@ -1,0 +1,220 @@
+// Paths from the eye, with a light sampled at every surface: the truth that virtual lights are measured against.
+// [Kajiya 1986; multiple importance sampling: Veach, Guibas 1995]
+#include <bit>
+#include <numbers>
+
+#include "clusters/light_kernel.h"
+#include "core/parallel.h"
+#include "integrators/integrator.h"
+#include "scene/bsdf.h"
+#include "vpl/emitters.h"
+
+namespace lumicut {
+
+namespace {
+
+constexpr size_t kChunk = 1024;       // points
+constexpr uint32_t kSureBounces = 3;  // before chance may end a path
+
+// Power heuristic. [Veach, Guibas 1995, sec. 4]
+float mis_weight(double a, double b) {
+  const double a2 = a * a, b2 = b * b;
+  return a2 + b2 > 0.0 ? static_cast<float>(a2 / (a2 + b2)) : 0.0f;
+}
+
+class PathTracer final : public Integrator {
+ public:
+  void prepare(const Scene& scene, const VplSet&, const Params& params, ShadeContext) override {
+    scene_ = &scene;
+    emitters_ = std::make_unique<Emitters>(scene);
+    samples_ = static_cast<uint32_t>(params.integer("samples"));
+    max_depth_ = static_cast<uint32_t>(params.integer("max_depth"));
+    seed_ = static_cast<uint64_t>(params.integer("seed"));
+    std::vector<double> power;
+    for (const Vpl& v : emitters_->delta_lights()) power.push_back(luminance(v.intensity));
+    delta_ = DiscreteDistribution(power);
+  }
+
+  void shade(const ShadePoints& points, std::span<Rgb> radiance, std::span<PointCounts> counts,
+             ShadeContext context) const override {
+    parallel_chunks(points.size(), kChunk, [&](size_t begin, size_t end) {
+      Counters total;
+      total.points = end - begin;
+      std::vector<Path> paths;
+      std::vector<uint32_t> rays(end - begin, 0);
+      std::fill(radiance.begin() + static_cast<ptrdiff_t>(begin), radiance.begin() + static_cast<ptrdiff_t>(end),
+                Rgb{});
+      for (uint32_t s = 0; s < samples_; ++s) {
+        if (context.progress.cancelled()) return;
+        paths.clear();
+        for (size_t i = begin; i < end; ++i)
+          paths.push_back({points.get(i), rng_of(points.get(i), s), static_cast<uint32_t>(i - begin)});
+        follow(paths, radiance.subspan(begin, end - begin), rays, context);
+      }
+      for (size_t i = begin; i < end; ++i) {
+        radiance[i] = radiance[i] / static_cast<float>(samples_);
+        if (!counts.empty()) counts[i] = {0, rays[i - begin], 0};
+        total.rays += rays[i - begin];
+      }
+      context.stats.add(total);
+    });
+    context.progress.check();
+  }
+
+ private:
+  struct Path {
+    SurfacePoint point;  // with all that the path has lost and gained in its reflectance
+    Rng rng;
+    uint32_t index;
+    Vec3f direction{};
+    Rgb weight{};
+    float pdf = 0.0f;
+  };
+  struct Shadow {
+    Rgb light;
+    uint32_t index;
+  };
+
+  Rng rng_of(const SurfacePoint& point, uint32_t sample) const {
+    const Vec3f at = (point.position - scene_->bounds().lo) / scene_->radius();
+    const auto word = [](float a, float b) {
+      return static_cast<uint64_t>(std::bit_cast<uint32_t>(a)) << 32 | std::bit_cast<uint32_t>(b);
+    };
+    return {hash64(seed_, sample), Stage::path, word(at.x, at.y), word(at.z, point.normal.x + point.mirror.x)};
+  }
+
+  // All paths of a chunk go on in step, so that rays are traced in batches.
+  void follow(std::vector<Path>& paths, std::span<Rgb> radiance, std::vector<uint32_t>& counts,
+              ShadeContext context) const {
+    std::vector<Ray> shadow_rays;
+    std::vector<Shadow> shadows;
+    std::vector<RayHit> rays;
+    for (uint32_t depth = 0; depth <= max_depth_ && !paths.empty(); ++depth) {
+      if (context.progress.cancelled()) return;
+      shadow_rays.clear(), shadows.clear(), rays.clear();
+      size_t alive = 0;
+      for (size_t i = 0; i < paths.size(); ++i) {
+        Path path = paths[i];
+        sample_lights(path, shadow_rays, shadows);
+        const float choice = path.rng.next_float(), u = path.rng.next_float(), v = path.rng.next_float();
+        const BsdfSample s = Bsdf(path.point).sample(choice, u, v);
+        if (!(s.pdf > 0.0f) || !is_finite(s.weight)) continue;
+        path.direction = s.direction, path.weight = s.weight, path.pdf = s.pdf;
+        RayHit ray;
+        ray.ray.org = path.point.position, ray.ray.dir = s.direction;
+        rays.push_back(ray);
+        paths[alive++] = path;
+      }
+      paths.erase(paths.begin() + static_cast<ptrdiff_t>(alive), paths.end());
+      scene_->accel().occluded(shadow_rays);
+      for (size_t i = 0; i < shadows.size(); ++i) {
+        ++counts[shadows[i].index];
+        if (!(shadow_rays[i].tfar < 0.0f)) radiance[shadows[i].index] += shadows[i].light;
+      }
+      scene_->accel().intersect(rays);
+      alive = 0;
+      for (size_t i = 0; i < paths.size(); ++i) {
+        ++counts[paths[i].index];
+        if (arrive(paths[i], rays[i], depth, radiance)) paths[alive++] = paths[i];
+      }
+      paths.erase(paths.begin() + static_cast<ptrdiff_t>(alive), paths.end());
+    }
+  }
+
+  // One lamp without extent and one sample of what has some, each by power.
+  void sample_lights(Path& path, std::vector<Ray>& rays, std::vector<Shadow>& shadows) const {
+    if (!delta_.empty()) {
+      const size_t i = delta_.sample(path.rng.next_float());
+      const Vpl& light = emitters_->delta_lights()[i];
+      add_shadow(path, light, light_point(light, light.intensity / static_cast<float>(delta_.pmf(i)), 0.0f, path.point),
+                 rays, shadows);
+    }
+    if (!emitters_->has_extended()) return;
+    const float u = path.rng.next_float();
+    const DirectSample s = emitters_->sample_direct(u, 1, path.rng);
+    Rgb light = light_point(s.vpl, s.vpl.intensity, 0.0f, path.point);
+    if (!(max_component(light) > 0.0f)) return;
+    if (s.seen_by_rays) {
+      const bool far = s.vpl.kind == VplKind::directional;
+      const Vec3f v = far ? -s.vpl.normal : s.vpl.position - path.point.position;
+      const Vec3f to_light = normalize(v);
+      const double cosine = far ? 1.0 : std::max(1e-9f, -dot(s.vpl.normal, to_light));
+      const double density = far ? s.density : s.density * length2(v) / cosine;
+      light = light * mis_weight(density, Bsdf(path.point).pdf(to_light));
+    }
+    add_shadow(path, s.vpl, light, rays, shadows);
+  }
+
+  void add_shadow(const Path& path, const Vpl& light, const Rgb& value, std::vector<Ray>& rays,
+                  std::vector<Shadow>& shadows) const {
+    if (!(max_component(value) > 0.0f) || !is_finite(value)) return;
+    Ray ray;
+    ray.org = path.point.position;
+    if (light.kind == VplKind::directional) {
+      ray.dir = -light.normal;
+    } else {
+      // Emissive meshes block: the ray ends before them.
+      const Vec3f end =
+          light.kind == VplKind::oriented ? light.position + light.normal * scene_->epsilon() : light.position;
+      ray.dir = end - ray.org, ray.tfar = 1.0f;
+    }
+    rays.push_back(ray);
+    shadows.push_back({value, path.index});
+  }
+
+  // What the path's ray found: adds what it emits; true where the path goes on from there.
+  bool arrive(Path& path, const RayHit& hit, uint32_t depth, std::span<Rgb> radiance) const {
+    Rgb& sum = radiance[path.index];
+    if (hit.hit.geom == kNoId) {
+      const Rgb light = scene_->environment_radiance(path.direction);
+      if (max_component(light) > 0.0f)
+        sum += path.weight * light * mis_weight(path.pdf, emitters_->environment_density(path.direction));
+      return false;
+    }
+    // A ray that meets its own surface at once left it below the horizon of the triangle.
+    if (hit.ray.tfar < 4.0f * scene_->epsilon()) return false;
+    const SurfaceHit surface = scene_->surface(hit);
+    const Vec3f to_viewer = -path.direction;
+    const Rgb emitted = scene_->emitted(surface, to_viewer);
+    if (max_component(emitted) > 0.0f) {
+      const double cosine = std::max(1e-9f, std::abs(dot(surface.geometric_normal, to_viewer)));
+      const double density = emitters_->mesh_density(surface) * double{surface.t} * surface.t / cosine;
+      sum += path.weight * emitted * mis_weight(path.pdf, density);
+    }
+    if (depth >= max_depth_) return false;
+    path.point = scene_->shade_point(surface, to_viewer, path.point.pixel);
+    Rgb factor = path.weight;
+    if (depth >= kSureBounces) {
+      const float survive = std::min(0.95f, max_component(Bsdf(path.point).albedo() * factor));
+      if (!(path.rng.next_float() < survive)) return false;
+      factor = factor / survive;
+    }
+    path.point.attenuate(factor);
+    return true;
+  }
+
+  const Scene* scene_ = nullptr;
+  std::unique_ptr<Emitters> emitters_;
+  DiscreteDistribution delta_;
+  uint32_t samples_ = 1, max_depth_ = 32;
+  uint64_t seed_ = 1;
+};
+
+}  // namespace
+
+extern const IntegratorEntry path_tracer_integrator;
+const IntegratorEntry path_tracer_integrator = {
+    "path_tracer",
+    "Path tracer",
+    "Traces paths from the eye: noise in place of bias, and the truth for all other methods; virtual lights and the "
+    "clamp "
+    "mean nothing to it",
+    "Kajiya 1986; Veach, Guibas 1995",
+    [] {
+      return std::vector<ParamInfo>{
+          {"samples", "Paths", "Paths from each shaded point", "paths a point", ParamType::integer, "16", 1, 1e6}};
+    },
+    []() -> std::unique_ptr<Integrator> { return std::make_unique<PathTracer>(); },
+    LightSource::emitters};
+
+}  // namespace lumicut

@@ -1,0 +1,141 @@
+// The path tracer against closed forms, and virtual lights with their clamp compensated against the path tracer.
+#include <gtest/gtest.h>
+
+#include "tests/support/render.h"
+
+namespace lumicut {
+namespace {
+
+constexpr float kPi = 3.14159265f;
+
+Camera inside_looking_along_y() {
+  Camera camera;
+  camera.position = {0, -0.9f, 0};
+  camera.right = {1, 0, 0}, camera.forward = {0, 1, 0}, camera.up = {0, 0, 1};
+  camera.tan_half_fov_y = 0.7f;
+  return camera;
+}
+
+// A closed box that emits and reflects evenly: radiance is emission / (1 − albedo) everywhere.
+std::unique_ptr<Scene> furnace(float albedo, float emission) {
+  auto scene = std::make_unique<Scene>(Scene::Config{"embree", true});
+  Material m = test::diffuse(albedo, albedo, albedo);
+  m.emission = {emission, emission, emission};
+  scene->set_materials({m});
+  Mesh mesh;
+  test::add_box(mesh, {-1, -1, -1}, {1, 1, 1}, 0, true);
+  scene->add_mesh(std::move(mesh));
+  scene->set_camera(inside_looking_along_y());
+  Progress progress;
+  scene->commit(progress);
+  return scene;
+}
+
+std::vector<double> region_means(const std::vector<Rgb>& image, uint32_t width, uint32_t height, uint32_t parts) {
+  std::vector<double> means(size_t{parts} * parts, 0.0);
+  for (uint32_t y = 0; y < height; ++y)
+    for (uint32_t x = 0; x < width; ++x)
+      means[(y * parts / height) * parts + x * parts / width] +=
+          luminance(image[size_t{y} * width + x]) * parts * parts / (double{static_cast<double>(width)} * height);
+  return means;
+}
+
+double mean_of(const std::vector<Rgb>& image) {
+  double sum = 0;
+  for (const Rgb& c : image) sum += luminance(c) / static_cast<double>(image.size());
+  return sum;
+}
+
+TEST(PathTracer, RadianceInAFurnaceIsTheGeometricSum) {
+  const auto scene = furnace(0.5f, 1.0f);
+  const auto image = test::render(*scene, "path_tracer", {}, {{"samples", "64"}, {"max_depth", "64"}}, 32, 24).radiance;
+  // 49,152 paths with a spread of about the mean: .5 % is one standard deviation.
+  EXPECT_NEAR(mean_of(image), 2.0, 0.03);
+}
+
+TEST(PathTracer, DirectLightOfADiskIsTheClosedForm) {
+  auto scene = std::make_unique<Scene>(Scene::Config{"embree", true});
+  scene->set_materials({test::diffuse(0.5f, 0.5f, 0.5f)});
+  Mesh mesh;
+  test::add_quad(mesh, {-9, -9, 0}, {9, -9, 0}, {9, 9, 0}, {-9, 9, 0}, 0);
+  scene->add_mesh(std::move(mesh));
+  Light disk;
+  disk.type = LightType::disk;
+  disk.position = {0, 0, 2};
+  disk.u = {2, 0, 0}, disk.v = {0, -2, 0};  // radius 1, shines down
+  disk.value = {3, 3, 3};
+  scene->set_lights({disk});
+  Camera camera;
+  camera.position = {0, 0, 1};
+  camera.right = {1, 0, 0}, camera.up = {0, 1, 0}, camera.forward = {0, 0, -1};
+  camera.tan_half_fov_y = 0.01f;
+  scene->set_camera(camera);
+  Progress progress;
+  scene->commit(progress);
+  const auto image = test::render(*scene, "path_tracer", {}, {{"samples", "400"}}, 8, 8).radiance;
+  // Irradiance below the middle of a Lambertian disk: π L r²/(r² + h²); radiance: albedo/π of it.
+  const double expected = 0.5 / kPi * (kPi * 3.0 / (1 + 4));
+  EXPECT_NEAR(mean_of(image) / expected, 1.0, 0.01);  // 25,600 samples of 20 % spread: 0.13 %
+}
+
+// Emission seen by rays alone, by light samples alone and by both must agree.
+TEST(PathTracer, AnEmissiveMeshGivesWhatARectangleLampGives) {
+  const auto image = [](bool mesh_light) {
+    auto scene = std::make_unique<Scene>(Scene::Config{"embree", true});
+    Material glossy = test::diffuse(0.3f, 0.3f, 0.3f), lamp = test::diffuse(0, 0, 0);
+    glossy.specular = {0.5f, 0.5f, 0.5f};
+    glossy.shininess = 200.0f;
+    lamp.emission = {5, 5, 5};
+    scene->set_materials({glossy, lamp});
+    Mesh mesh;
+    test::add_quad(mesh, {-3, -3, 0}, {3, -3, 0}, {3, 3, 0}, {-3, 3, 0}, 0);
+    if (mesh_light) test::add_quad(mesh, {-1, -1, 1}, {-1, 1, 1}, {1, 1, 1}, {1, -1, 1}, 1);
+    scene->add_mesh(std::move(mesh));
+    if (!mesh_light) {
+      Light l;
+      l.type = LightType::rectangle;
+      l.position = {0, 0, 1};
+      l.u = {2, 0, 0}, l.v = {0, -2, 0};
+      l.value = {5, 5, 5};
+      scene->set_lights({l});
+    }
+    Camera camera;
+    camera.position = {0, -4, 0.9f};
+    camera.right = {1, 0, 0}, camera.forward = normalize(Vec3f{0, 1, -0.3f});
+    camera.up = cross(camera.right, camera.forward);
+    camera.tan_half_fov_y = 0.2f;
+    scene->set_camera(camera);
+    Progress progress;
+    scene->commit(progress);
+    return test::render(*scene, "path_tracer", {}, {{"samples", "4096"}}, 32, 16).radiance;
+  };
+  const auto a = image(true), b = image(false);
+  // Rows that see the floor alone, in four parts.
+  const auto ra = region_means(a, 32, 16, 4), rb = region_means(b, 32, 16, 4);
+  for (size_t i = 8; i < 16; ++i) EXPECT_NEAR(ra[i] / rb[i], 1.0, 0.03) << i;  // about 1 % of noise each
+}
+
+// What the clamp takes away comes back: in the mean over many sets of lights the image is the path tracer's.
+TEST(Compensation, VirtualLightsMeanThePathTracersImage) {
+  const auto scene = test::make_room();
+  const auto truth =
+      test::render(*scene, "path_tracer", {}, {{"samples", "96"}, {"max_depth", "32"}}, 32, 24, 64).radiance;
+  constexpr float kClamp = 0.35f;  // of a room of side 2: a loss nobody can miss
+  constexpr int kPasses = 24;
+  std::vector<Rgb> mean(truth.size()), clamped(truth.size());
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const VplSet vpls = test::lights_of(*scene, 1500, 100 + pass);
+    const test::Settings settings{{"clamp_distance", "0.35"}};
+    const auto full = test::render(*scene, "exhaustive", vpls, settings, 32, 24, 4, 0, kClamp, 100 + pass).radiance;
+    const auto cut = test::render(*scene, "exhaustive", vpls, settings, 32, 24, 4, 0, 0.0f, 100 + pass).radiance;
+    for (size_t i = 0; i < mean.size(); ++i) mean[i] += full[i] / float{kPasses}, clamped[i] += cut[i] / float{kPasses};
+  }
+  EXPECT_LT(mean_of(clamped) / mean_of(truth), 0.95);
+  EXPECT_NEAR(mean_of(mean) / mean_of(truth), 1.0, 0.01);
+  const auto found = region_means(mean, 32, 24, 4), expected = region_means(truth, 32, 24, 4);
+  for (size_t i = 0; i < found.size(); ++i)
+    EXPECT_NEAR(found[i], expected[i], 0.02 * mean_of(truth)) << "part " << i;  // noise of both: about half a percent
+}
+
+}  // namespace
+}  // namespace lumicut
