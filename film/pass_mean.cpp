@@ -18,7 +18,6 @@ PassMean::PassMean(const Rect& crop, double confidence)
 void PassMean::add(const Film& pass, const Rect& rect, uint64_t passes, Film& mean) {
   const auto n = static_cast<double>(passes);
   const auto share = static_cast<float>(1.0 / n);
-  const double spread = passes < 2 ? 0.0 : student_t(confidence_, passes) / std::sqrt(n * (n - 1.0));
   for (uint32_t y = rect.y0; y < rect.y1; ++y)
     for (uint32_t x = rect.x0; x < rect.x1; ++x) {
       Sums& s = sums_[index(x, y)];
@@ -32,15 +31,29 @@ void PassMean::add(const Film& pass, const Rect& rect, uint64_t passes, Film& me
         float* out = mean.pixel(c.channel, x, y);
         if (c.channel == Channel::radiance) {
           for (int k = 0; k < 3; ++k) out[k] = static_cast<float>(s.radiance[k] / n);
-        } else if (c.channel == Channel::error) {
-          *out = static_cast<float>(spread * std::sqrt(std::max(0.0, s.squares)));
-        } else {
+        } else if (c.channel != Channel::error) {
           const bool first = c.channel == Channel::depth || c.channel == Channel::position;
           const float* in = pass.pixel(c.channel, x, y);
           for (uint32_t k = 0; k < c.components; ++k)
             if (passes == 1 || !first) out[k] += (in[k] - out[k]) * share;
         }
       }
+    }
+}
+
+void PassMean::write_error(uint64_t passes, Film& mean) const {
+  if (passes < 2) return;
+  const auto n = static_cast<double>(passes);
+  const double t = student_t(confidence_, passes);
+  for (uint32_t y = crop_.y0; y < crop_.y1; ++y)
+    for (uint32_t x = crop_.x0; x < crop_.x1; ++x) {
+      double sum = 0.0;
+      int count = 0;
+      for (uint32_t v = std::max(crop_.y0 + 1, y) - 1; v < std::min(crop_.y1, y + 2); ++v)
+        for (uint32_t u = std::max(crop_.x0 + 1, x) - 1; u < std::min(crop_.x1, x + 2); ++u, ++count)
+          sum += sums_[index(u, v)].squares;
+      const double squares = std::max(sums_[index(x, y)].squares, sum / count);
+      mean.set(Channel::error, x, y, static_cast<float>(t * std::sqrt(std::max(0.0, squares) / (n * (n - 1.0)))));
     }
 }
 

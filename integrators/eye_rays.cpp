@@ -7,7 +7,12 @@
 namespace lumicut {
 
 EyeRays::EyeRays(const Scene& scene, float distance, uint64_t seed)
-    : scene_(scene), distance_(distance), seed_(seed), emitters_(scene), lamps_(scene, emitters_, distance) {}
+    : scene_(scene),
+      distance_(distance),
+      seed_(seed),
+      emitters_(scene),
+      lamps_(scene, emitters_, distance),
+      lamp_surfaces_(scene) {}
 
 Rng EyeRays::rng_of(const SurfacePoint& point, uint32_t level) const {
   const Vec3f at = (point.position - scene_.bounds().lo) / scene_.radius();
@@ -33,6 +38,7 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
   std::vector<Rgb> weights;
   std::vector<uint32_t> pixels;
   std::vector<Rng> rngs;
+  std::vector<float> pdfs;
   std::vector<Ray> shadows;
   for (size_t i = 0; i < points.size(); ++i) {
     const SurfacePoint point = points.get(i);
@@ -43,7 +49,8 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
     if (!(s.pdf > 0.0f) || !is_finite(s.weight)) continue;
     RayHit ray;
     ray.ray.org = point.position, ray.ray.dir = s.direction;
-    rays.push_back(ray), weights.push_back(s.weight), pixels.push_back(point.pixel), rngs.push_back(rng);
+    rays.push_back(ray), weights.push_back(s.weight), pixels.push_back(point.pixel), rngs.push_back(rng),
+        pdfs.push_back(s.pdf);
   }
   if (!shadows.empty()) {
     scene_.accel().occluded(shadows);
@@ -53,6 +60,14 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
   if (!rays.empty()) scene_.accel().intersect(rays);
   counters.rays += shadows.size() + rays.size();
   for (size_t i = 0; i < rays.size(); ++i) {
+    if (!lamp_surfaces_.empty())
+      lamp_surfaces_.for_each_hit(
+          rays[i].ray.org, rays[i].ray.dir, std::min(rays[i].ray.tfar, distance_), [&](const LampSurfaces::Hit& lamp) {
+            const float share = lamp.t / distance_;
+            const double density = double{lamp.t} * lamp.t / (double{lamp.cosine} * lamp.area);
+            hits.light.push_back(weights[i] * lamp.radiance * ((1.0f - share * share) * mis_weight(pdfs[i], density)));
+            hits.pixel.push_back(pixels[i]);
+          });
     // A ray that meets its own surface at once left it below the horizon of the triangle.
     if (rays[i].hit.geom == kNoId || rays[i].ray.tfar < 4.0f * scene_.epsilon()) continue;
     const SurfaceHit surface = scene_.surface(rays[i]);

@@ -8,6 +8,7 @@
 #include "core/stats.h"
 #include "integrators/near_lamps.h"
 #include "scene/scene.h"
+#include "vpl/lamp_surfaces.h"
 
 namespace lumicut {
 
@@ -37,6 +38,7 @@ class EyeRays {
   const uint64_t seed_;
   Emitters emitters_;
   NearLamps lamps_;
+  LampSurfaces lamp_surfaces_;
 };
 
 }  // namespace lumicut

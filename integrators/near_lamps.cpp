@@ -2,6 +2,8 @@
 
 #include "clusters/light_kernel.h"
 #include "core/rng.h"
+#include "scene/bsdf.h"
+#include "vpl/lamp_surfaces.h"
 
 namespace lumicut {
 
@@ -57,10 +59,17 @@ uint64_t NearLamps::key(const Cell& c) {
   return hash64(hash64(static_cast<uint64_t>(c.x), static_cast<uint64_t>(c.y)), static_cast<uint64_t>(c.z));
 }
 
-Rgb NearLamps::lost_light(const Vpl& vpl, const SurfacePoint& point) const {
+Rgb NearLamps::lost_light(uint32_t lamp, const Vpl& vpl, const SurfacePoint& point) const {
   const float d2 = length2(vpl.position - point.position), c2 = distance_ * distance_;
   if (!(d2 < c2)) return {};
-  return light_point(vpl, vpl.intensity, 0.0f, point) * (1.0f - d2 / c2);
+  Rgb lost = light_point(vpl, vpl.intensity, 0.0f, point) * (1.0f - d2 / c2);
+  const Light& light = scene_.lights()[lamp];
+  if (LampSurfaces::has(light) && max_component(lost) > 0.0f) {
+    const Vec3f to_light = normalize(vpl.position - point.position);
+    const double cosine = std::max(1e-9f, -dot(vpl.normal, to_light));
+    lost = lost * mis_weight(d2 / (cosine * LampSurfaces::area(light)), Bsdf(point).pdf(to_light));
+  }
+  return lost;
 }
 
 }  // namespace lumicut

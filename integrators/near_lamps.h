@@ -17,6 +17,7 @@ class NearLamps {
   bool empty() const { return lamps_.empty(); }
 
   // What one sample of each near lamp gives the point beyond its clamped light, before visibility: fn(vpl, radiance).
+  // Weighted for rays of the point's reflectance that find the same lamps [vpl/lamp_surfaces.h].
   template <typename Fn>
   void for_each_share(const SurfacePoint& point, Rng& rng, Fn&& fn) const {
     for (uint32_t i : large_) share(i, point, rng, fn);
@@ -35,10 +36,10 @@ class NearLamps {
   template <typename Fn>
   void share(uint32_t lamp, const SurfacePoint& point, Rng& rng, Fn&& fn) const {
     const Vpl vpl = emitters_.sample_lamp(lamps_[lamp], rng);
-    const Rgb lost = lost_light(vpl, point);
+    const Rgb lost = lost_light(lamps_[lamp], vpl, point);
     if (max_component(lost) > 0.0f) fn(vpl, lost);
   }
-  Rgb lost_light(const Vpl& vpl, const SurfacePoint& point) const;
+  Rgb lost_light(uint32_t lamp, const Vpl& vpl, const SurfacePoint& point) const;
 
   const Scene& scene_;
   const Emitters& emitters_;

@@ -8,6 +8,7 @@
 #include "integrators/integrator.h"
 #include "scene/bsdf.h"
 #include "vpl/emitters.h"
+#include "vpl/lamp_surfaces.h"
 
 namespace lumicut {
 
@@ -16,17 +17,12 @@ namespace {
 constexpr size_t kChunk = 1024;       // points
 constexpr uint32_t kSureBounces = 3;  // before chance may end a path
 
-// Power heuristic. [Veach, Guibas 1995, sec. 4]
-float mis_weight(double a, double b) {
-  const double a2 = a * a, b2 = b * b;
-  return a2 + b2 > 0.0 ? static_cast<float>(a2 / (a2 + b2)) : 0.0f;
-}
-
 class PathTracer final : public Integrator {
  public:
   void prepare(const Scene& scene, const VplSet&, const Params& params, ShadeContext) override {
     scene_ = &scene;
     emitters_ = std::make_unique<Emitters>(scene);
+    lamps_ = std::make_unique<LampSurfaces>(scene);
     samples_ = static_cast<uint32_t>(params.integer("samples"));
     max_depth_ = static_cast<uint32_t>(params.integer("max_depth"));
     seed_ = static_cast<uint64_t>(params.integer("seed"));
@@ -165,6 +161,11 @@ class PathTracer final : public Integrator {
   // What the path's ray found: adds what it emits; true where the path goes on from there.
   bool arrive(Path& path, const RayHit& hit, uint32_t depth, std::span<Rgb> radiance) const {
     Rgb& sum = radiance[path.index];
+    if (!lamps_->empty())
+      lamps_->for_each_hit(hit.ray.org, path.direction, hit.ray.tfar, [&](const LampSurfaces::Hit& lamp) {
+        const double density = emitters_->lamp_density(lamp.lamp) * double{lamp.t} * lamp.t / lamp.cosine;
+        sum += path.weight * lamp.radiance * mis_weight(path.pdf, density);
+      });
     if (hit.hit.geom == kNoId) {
       const Rgb light = scene_->environment_radiance(path.direction);
       if (max_component(light) > 0.0f)
@@ -195,6 +196,7 @@ class PathTracer final : public Integrator {
 
   const Scene* scene_ = nullptr;
   std::unique_ptr<Emitters> emitters_;
+  std::unique_ptr<LampSurfaces> lamps_;
   DiscreteDistribution delta_;
   uint32_t samples_ = 1, max_depth_ = 32;
   uint64_t seed_ = 1;

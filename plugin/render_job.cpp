@@ -90,6 +90,10 @@ void lumicut_render_t::render_passes() {
   uint32_t done = 0;
   double error = std::numeric_limits<double>::infinity(), last_seconds = 0.0;
   const auto finish_pass = [&] {
+    {
+      const std::lock_guard lock(film_mutex_);
+      mean.write_error(done, film_);
+    }
     error = mean.error(film_, done);
     stats.set_value("passes", done);
     if (done >= 2) stats.set_value("error", error);

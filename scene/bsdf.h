@@ -85,6 +85,12 @@ inline Vec3f sample_visible_normal(const Vec3f& view, float alpha, float u, floa
   return normalize(Vec3f{alpha * n.x, alpha * n.y, std::max(1e-6f, n.z)});
 }
 
+// Power heuristic for a sample drawn with density `a`, where `b` could have drawn it too. [Veach, Guibas 1995, sec. 4]
+inline float mis_weight(double a, double b) {
+  const double a2 = a * a, b2 = b * b;
+  return a2 + b2 > 0.0 ? static_cast<float>(a2 / (a2 + b2)) : 0.0f;
+}
+
 struct BsdfSample {
   Vec3f direction;   // unit
   Rgb weight{};      // BRDF · cosine / density

@@ -63,6 +63,12 @@ double profile_solid_angle(const Vpl& spot) {
 
 }  // namespace
 
+Rgb lamp_radiance(const Light& light, float cosine) {
+  if (!narrowed(light)) return light.value;
+  const Vpl profile = spread_profile(light);
+  return light.value * profile.intensity * (spot_profile(profile, cosine) / cosine);
+}
+
 DiscreteDistribution::DiscreteDistribution(const std::vector<double>& weights) {
   cdf_.resize(weights.size() + 1, 0.0);
   for (size_t i = 0; i < weights.size(); ++i) cdf_[i + 1] = cdf_[i] + std::max(0.0, weights[i]);
@@ -268,7 +274,7 @@ DirectSample Emitters::sample_direct(double u, uint64_t count, Rng& rng) const {
   } else {
     float area_pdf;
     v = surface_light(e, weight, rng, area_pdf);
-    s.seen_by_rays = e.kind == Kind::triangle, s.density = share * area_pdf;
+    s.seen_by_rays = e.kind != Kind::sphere, s.density = share * area_pdf;
   }
   return s;
 }
@@ -307,6 +313,10 @@ double Emitters::mesh_density(const SurfaceHit& surface) const {
   if (material.emission_texture >= 0) emission = emission * texture_mean_[material.emission_texture];
   // The area of the triangle, and the side where both emit, cancel.
   return std::numbers::pi * luminance(emission) / extended_power_.total();
+}
+
+double Emitters::lamp_density(uint32_t lamp) const {
+  return std::numbers::pi * luminance(scene_.lights()[lamp].value) / extended_power_.total();
 }
 
 double Emitters::environment_density(const Vec3f& towards) const {

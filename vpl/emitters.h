@@ -36,9 +36,12 @@ struct EmittedRay {
 // A virtual light that stands for extended emitters.
 struct DirectSample {
   Vpl vpl;
-  bool seen_by_rays = false;  // an emissive mesh or the environment; lamps are invisible
+  bool seen_by_rays = false;  // paths may find it too: a mesh, the environment, a rectangle or disk [lamp_surfaces.h]
   double density = 0.0;       // of those: for each unit of area, or for each steradian of the environment
 };
+
+// Radiance of a rectangle or disk at the cosine to its axis, above 0.
+Rgb lamp_radiance(const Light& light, float cosine);
 
 class Emitters {
  public:
@@ -57,6 +60,7 @@ class Emitters {
   // Density with which sample_direct (of a count of 1) draws a place on an emissive mesh, for each unit of area, and a
   // direction towards the environment, for each steradian.
   double mesh_density(const SurfaceHit& surface) const;
+  double lamp_density(uint32_t lamp) const;  // of a rectangle or disk
   double environment_density(const Vec3f& towards) const;
 
  private:
