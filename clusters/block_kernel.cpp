@@ -9,7 +9,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 
-template <VplKind kKind, bool kGlossy>
+template <VplKind kKind, Lobes kLobes>
 HWY_INLINE void Run(std::span<const Vpl> lights, float weight, float clamp2, const ShadePoints& points, size_t first,
                     size_t count, bool add, BlockSums& sums) {
   const D d;
@@ -19,25 +19,40 @@ HWY_INLINE void Run(std::span<const Vpl> lights, float weight, float clamp2, con
     const V3 position = Load3(d, points.position, p), normal = Load3(d, points.normal, p);
     V3 mirror{zero, zero, zero};
     V shininess = zero;
-    if constexpr (kGlossy) mirror = Load3(d, points.mirror, p), shininess = hn::LoadU(d, points.shininess.data() + p);
-    V3 even{zero, zero, zero}, lobed{zero, zero, zero};  // summed over lights: what diffuse and specular multiply
+    if constexpr (kLobes != Lobes::none) mirror = Load3(d, points.mirror, p), shininess = Load1(d, points.shininess, p);
+    // Summed over lights: what diffuse, specular and grazing multiply.
+    V3 even{zero, zero, zero}, lobed{zero, zero, zero}, edge{zero, zero, zero};
+    const auto add_to = [](V3& total, const V3& intensity, V factor) {
+      total = {hn::MulAdd(intensity.x, factor, total.x), hn::MulAdd(intensity.y, factor, total.y),
+               hn::MulAdd(intensity.z, factor, total.z)};
+    };
     for (const Vpl& light : lights) {
       V3 to_light;
       const V geometry = Geometry<kKind>(d, light, clamp2, position, normal, to_light);
       const V3 intensity = Set3(d, light.intensity);
-      even = {hn::MulAdd(intensity.x, geometry, even.x), hn::MulAdd(intensity.y, geometry, even.y),
-              hn::MulAdd(intensity.z, geometry, even.z)};
-      if constexpr (kGlossy) {
+      if constexpr (kLobes == Lobes::ggx) {
+        if (hn::AllFalse(d, hn::Gt(geometry, zero))) continue;
+        const Parts parts = PartsTowards<kLobes>(d, points, p, normal, mirror, shininess, to_light);
+        add_to(even, intensity, hn::Mul(geometry, parts.diffuse));
+        add_to(lobed, intensity, hn::Mul(geometry, parts.specular));
+        add_to(edge, intensity, hn::Mul(geometry, parts.grazing));
+      } else {
+        add_to(even, intensity, geometry);
+      }
+      if constexpr (kLobes == Lobes::cosine) {
         const V cosine = Dot(mirror, to_light);
         if (hn::AllFalse(d, hn::And(hn::Gt(cosine, zero), hn::Gt(geometry, zero)))) continue;
-        const V lobe = hn::Mul(Lobe(d, cosine, shininess), geometry);
-        lobed = {hn::MulAdd(intensity.x, lobe, lobed.x), hn::MulAdd(intensity.y, lobe, lobed.y),
-                 hn::MulAdd(intensity.z, lobe, lobed.z)};
+        add_to(lobed, intensity, hn::Mul(Lobe(d, cosine, shininess), geometry));
       }
     }
     const V3 diffuse = Load3(d, points.diffuse, p);
     V3 out{hn::Mul(diffuse.x, even.x), hn::Mul(diffuse.y, even.y), hn::Mul(diffuse.z, even.z)};
-    if constexpr (kGlossy) {
+    if constexpr (kLobes == Lobes::ggx) {
+      const V3 grazing = Load3(d, points.grazing, p);
+      out = {hn::MulAdd(grazing.x, edge.x, out.x), hn::MulAdd(grazing.y, edge.y, out.y),
+             hn::MulAdd(grazing.z, edge.z, out.z)};
+    }
+    if constexpr (kLobes != Lobes::none) {
       const V3 specular = Load3(d, points.specular, p);
       out = {hn::MulAdd(specular.x, lobed.x, out.x), hn::MulAdd(specular.y, lobed.y, out.y),
              hn::MulAdd(specular.z, lobed.z, out.z)};
@@ -52,10 +67,12 @@ HWY_INLINE void Run(std::span<const Vpl> lights, float weight, float clamp2, con
 template <VplKind kKind>
 HWY_INLINE void RunKind(std::span<const Vpl> lights, float weight, float clamp2, const ShadePoints& points,
                         size_t first, size_t count, bool add, BlockSums& sums) {
-  if (points.glossy())
-    Run<kKind, true>(lights, weight, clamp2, points, first, count, add, sums);
+  if (points.ggx())
+    Run<kKind, Lobes::ggx>(lights, weight, clamp2, points, first, count, add, sums);
+  else if (points.glossy())
+    Run<kKind, Lobes::cosine>(lights, weight, clamp2, points, first, count, add, sums);
   else
-    Run<kKind, false>(lights, weight, clamp2, points, first, count, add, sums);
+    Run<kKind, Lobes::none>(lights, weight, clamp2, points, first, count, add, sums);
 }
 
 void LightBlock(std::span<const Vpl> lights, float weight, float clamp2, const ShadePoints& points, size_t first,

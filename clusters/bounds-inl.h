@@ -80,10 +80,55 @@ HWY_INLINE V BoundOfLobe(D d, V beta, V shininess) {
   return hn::IfThenElseZero(hn::Gt(beta, hn::Zero(d)), lobe);
 }
 
+// A part in 10^4 against the rounding of sharp lobes' angles.
+constexpr float kGgxSlack = 1.0002f;
+
+// Largest D·V·(n·l) over `cosine`, of lights at most `cosine` to the normal and `beta` to the mirror direction, for
+// α² between `low2` and `high2` and n·v of `nv` or more. The half vector is turned from the normal by at least half as
+// much as the light from the mirror direction; D is largest where α² is that turn's squared tangent, V grows with n·l.
+HWY_INLINE V BoundOfGgxLobe(D d, V beta, V cosine, V low2, V high2, V nv) {
+  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  beta = hn::Min(one, hn::Add(beta, hn::Set(d, 1e-6f)));
+  const V nl = hn::Min(one, hn::Max(cosine, hn::Set(d, 1e-7f)));
+  const V sine2 = hn::Mul(hn::Set(d, 0.5f), hn::Sub(one, beta)), cosine2 = hn::Sub(one, sine2);
+  const V best = hn::Div(sine2, hn::Max(cosine2, hn::Set(d, 1e-6f)));
+  const V a2 = hn::Min(high2, hn::Max(low2, best));
+  const V e = hn::MulAdd(a2, cosine2, sine2), rest = hn::Sub(one, low2);
+  nv = hn::Max(nv, hn::Set(d, 1e-4f));
+  const V root_v = hn::Sqrt(hn::Max(zero, hn::MulAdd(hn::Mul(nv, nv), rest, low2)));
+  const V root_l = hn::Sqrt(hn::Max(zero, hn::MulAdd(hn::Mul(nl, nl), rest, low2)));
+  const V smith = hn::MulAdd(nl, root_v, hn::Mul(nv, root_l));
+  return hn::Div(hn::Mul(a2, hn::Set(d, 0.15915494309f * kGgxSlack)), hn::Mul(hn::Mul(e, e), smith));
+}
+
+// Largest (1 − v·h)⁵: lights are at most `beta` to the mirror direction and above the horizon, views at least `nv` to
+// the normal.
+HWY_INLINE V BoundOfFresnel(D d, V beta, V nv) {
+  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  const V sine = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(nv, nv, one)));
+  const V apart = hn::Min(hn::Add(sine, hn::Set(d, 1e-6f)), hn::Add(beta, hn::Set(d, 1e-6f)));  // −v·l, at most
+  const V vh = hn::Sqrt(hn::Max(zero, hn::Mul(hn::Set(d, 0.5f), hn::Sub(one, apart))));
+  const V m = hn::Sub(one, vh), m2 = hn::Mul(m, m);
+  return hn::Mul(hn::Mul(m2, m2), m);
+}
+
+// specular + (grazing − specular)·fresnel, where that is more.
+HWY_INLINE V3 BoundOfSchlick(D d, const V3& specular, const V3& grazing, V fresnel) {
+  const auto one = [&](V s, V g) { return hn::MulAdd(hn::Max(hn::Zero(d), hn::Sub(g, s)), fresnel, s); };
+  return {one(specular.x, grazing.x), one(specular.y, grazing.y), one(specular.z, grazing.z)};
+}
+
+// Largest factor of the diffuse part, which grows with the cosine.
+HWY_INLINE V BoundOfFading(D d, V fade, V cosine) {
+  const V one = hn::Set(d, 1.0f);
+  const V m = hn::Sub(one, hn::Min(one, hn::Max(hn::Zero(d), cosine))), m2 = hn::Mul(m, m);
+  return hn::NegMulAdd(fade, hn::Mul(m2, m2), one);
+}
+
 // light_node_bounds of one kind of light. Departs from Walter et al.: luminance is bounded through each colour channel
 // on its own, so a blue lamp over a red wall costs nothing; and the cosine to the light's cone and to the surface are
 // bounded in their own frames each.
-template <VplKind kKind, bool kGlossy>
+template <VplKind kKind, Lobes kLobes>
 HWY_INLINE void Bounds(const LightNode& node, const PointBlock& block, float clamp2, float* HWY_RESTRICT bounds) {
   const D d;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
@@ -117,7 +162,7 @@ HWY_INLINE void Bounds(const LightNode& node, const PointBlock& block, float cla
     }
     geometry = hn::Mul(geometry, hn::Max(zero, cosine));
     V3 f = Load3(d, block.diffuse, i);
-    if constexpr (kGlossy) {
+    if constexpr (kLobes != Lobes::none) {
       const V3 mirror = Load3(d, block.mirror, i), specular = Load3(d, block.specular, i);
       V beta;
       if constexpr (kKind == VplKind::directional)
@@ -125,8 +170,21 @@ HWY_INLINE void Bounds(const LightNode& node, const PointBlock& block, float cla
       else
         beta = CosineToBox(d, to_center, half, Load3(d, block.mirror_tangent, i), Load3(d, block.mirror_bitangent, i),
                            mirror);
-      const V lobe = BoundOfLobe(d, beta, hn::Load(d, block.shininess + i));
-      f = {hn::MulAdd(specular.x, lobe, f.x), hn::MulAdd(specular.y, lobe, f.y), hn::MulAdd(specular.z, lobe, f.z)};
+      const V shininess = hn::Load(d, block.shininess + i);
+      V lobe = zero;
+      V3 share = specular;
+      auto ggx = hn::Lt(shininess, zero);
+      if (kLobes == Lobes::cosine || !hn::AllTrue(d, ggx))
+        lobe = BoundOfLobe(d, beta, kLobes == Lobes::cosine ? shininess : hn::Max(zero, shininess));
+      if (kLobes == Lobes::ggx && !hn::AllFalse(d, ggx)) {
+        const V nv = Dot(normal, mirror), alpha2 = Square(shininess);
+        lobe = hn::IfThenElse(ggx, BoundOfGgxLobe(d, beta, cosine, alpha2, alpha2, nv), lobe);
+        const V fresnel = hn::IfThenElseZero(ggx, BoundOfFresnel(d, beta, nv));
+        share = BoundOfSchlick(d, specular, Load3(d, block.grazing, i), fresnel);
+        const V fading = BoundOfFading(d, hn::Load(d, block.fade + i), cosine);
+        f = {hn::Mul(f.x, fading), hn::Mul(f.y, fading), hn::Mul(f.z, fading)};
+      }
+      f = {hn::MulAdd(share.x, lobe, f.x), hn::MulAdd(share.y, lobe, f.y), hn::MulAdd(share.z, lobe, f.z)};
     }
     hn::StoreU(BoundOfLuminance(d, f, geometry, node.intensity), d, bounds + i);
   }
@@ -134,7 +192,9 @@ HWY_INLINE void Bounds(const LightNode& node, const PointBlock& block, float cla
 
 template <VplKind kKind>
 HWY_INLINE void BoundsOfKind(const LightNode& node, const PointBlock& block, float clamp2, float* bounds) {
-  block.glossy ? Bounds<kKind, true>(node, block, clamp2, bounds) : Bounds<kKind, false>(node, block, clamp2, bounds);
+  if (block.ggx) return Bounds<kKind, Lobes::ggx>(node, block, clamp2, bounds);
+  block.glossy ? Bounds<kKind, Lobes::cosine>(node, block, clamp2, bounds)
+               : Bounds<kKind, Lobes::none>(node, block, clamp2, bounds);
 }
 
 // light_node_bounds, to be inlined.

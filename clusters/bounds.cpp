@@ -27,6 +27,7 @@ void light_node_bounds(const LightNode& node, const PointBlock& block, float cla
 
 void PointBlock::load(const ShadePoints& points, size_t first) {
   glossy = points.glossy();
+  ggx = false;
   for (size_t i = 0; i < kLanes; ++i) {
     const SurfacePoint p = points.get(first + i);
     const Frame n(p.normal), m(p.mirror);
@@ -34,9 +35,10 @@ void PointBlock::load(const ShadePoints& points, size_t first) {
       position[k][i] = p.position[k];
       normal[k][i] = p.normal[k], tangent[k][i] = n.t[k], bitangent[k][i] = n.b[k];
       mirror[k][i] = p.mirror[k], mirror_tangent[k][i] = m.t[k], mirror_bitangent[k][i] = m.b[k];
-      diffuse[k][i] = p.diffuse[k], specular[k][i] = p.specular[k];
+      diffuse[k][i] = p.diffuse[k], specular[k][i] = p.specular[k], grazing[k][i] = p.grazing[k];
     }
-    shininess[i] = p.shininess;
+    shininess[i] = p.shininess, fade[i] = p.fade;
+    ggx = ggx || p.ggx();
   }
 }
 

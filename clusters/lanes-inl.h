@@ -22,6 +22,9 @@ struct V3 {
   V x, y, z;
 };
 
+// What of the reflectance is evaluated: the diffuse part alone, with Blinn's and Phong's lobes, or with GGX's too.
+enum class Lobes { none, cosine, ggx };
+
 HWY_INLINE V Dot(const V3& a, const V3& b) { return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, hn::Mul(a.x, b.x))); }
 HWY_INLINE V3 Load3(D d, const float (&a)[3][kLanes], size_t i) {
   return {hn::Load(d, a[0] + i), hn::Load(d, a[1] + i), hn::Load(d, a[2] + i)};

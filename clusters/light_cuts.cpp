@@ -27,17 +27,17 @@ HWY_INLINE void Increment(hn::Mask<D> mask, uint32_t* counts) {
 }
 
 // Unshadowed estimates of the points in `active`, and which of them get any.
-template <VplKind kKind, bool kGlossy>
+template <VplKind kKind, Lobes kLobes>
 HWY_INLINE uint32_t Estimate(const Vpl& light, const Rgb& intensity, float clamp2, const PointBlock& block,
                              uint32_t active, float* r, float* g, float* b) {
   const D d;
   uint32_t lit = 0;
   for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
     V3 to_light;
-    const V geometry =
-        Geometry<kKind>(d, light, clamp2, Load3(d, block.position, i), Load3(d, block.normal, i), to_light);
+    const V3 normal = Load3(d, block.normal, i);
+    const V geometry = Geometry<kKind>(d, light, clamp2, Load3(d, block.position, i), normal, to_light);
     const auto reached = hn::And(hn::Gt(geometry, hn::Zero(d)), MaskOf(d, active, i));
-    const V3 f = Reflectance<kGlossy>(d, block, i, to_light);
+    const V3 f = Reflectance<kLobes>(d, block, i, normal, to_light);
     const V cr = hn::IfThenElseZero(reached, hn::Mul(hn::Mul(f.x, geometry), hn::Set(d, intensity.x)));
     const V cg = hn::IfThenElseZero(reached, hn::Mul(hn::Mul(f.y, geometry), hn::Set(d, intensity.y)));
     const V cb = hn::IfThenElseZero(reached, hn::Mul(hn::Mul(f.z, geometry), hn::Set(d, intensity.z)));
@@ -50,8 +50,9 @@ HWY_INLINE uint32_t Estimate(const Vpl& light, const Rgb& intensity, float clamp
 template <VplKind kKind>
 HWY_INLINE uint32_t EstimateOfKind(const Vpl& light, const Rgb& intensity, float clamp2, const PointBlock& block,
                                    uint32_t active, float* r, float* g, float* b) {
-  return block.glossy ? Estimate<kKind, true>(light, intensity, clamp2, block, active, r, g, b)
-                      : Estimate<kKind, false>(light, intensity, clamp2, block, active, r, g, b);
+  if (block.ggx) return Estimate<kKind, Lobes::ggx>(light, intensity, clamp2, block, active, r, g, b);
+  return block.glossy ? Estimate<kKind, Lobes::cosine>(light, intensity, clamp2, block, active, r, g, b)
+                      : Estimate<kKind, Lobes::none>(light, intensity, clamp2, block, active, r, g, b);
 }
 
 HWY_NOINLINE uint32_t EstimateOf(const Vpl& light, const Rgb& intensity, float clamp2, const PointBlock& block,

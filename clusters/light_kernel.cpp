@@ -12,7 +12,7 @@ HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-template <VplKind kKind, bool kGlossy>
+template <VplKind kKind, Lobes kLobes>
 HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
                         size_t count, LitPoints& lit, const uint16_t* wanted) {
   const D d;
@@ -28,12 +28,12 @@ HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, co
       if ((bits >> (i % kLanes) & ((1u << lanes) - 1)) == 0) continue;
       inside = hn::And(inside, MaskOf(d, bits, i % kLanes));
     }
-    const V3 position = Load3(d, points.position, p);
+    const V3 position = Load3(d, points.position, p), normal = Load3(d, points.normal, p);
     V3 to_light;
-    const V geometry = Geometry<kKind>(d, light, clamp2, position, Load3(d, points.normal, p), to_light);
+    const V geometry = Geometry<kKind>(d, light, clamp2, position, normal, to_light);
     const auto reached = hn::And(hn::Gt(geometry, zero), inside);
     if (hn::AllFalse(d, reached)) continue;
-    const V3 f = Reflectance<kGlossy>(d, points, p, to_light);
+    const V3 f = Reflectance<kLobes>(d, points, p, normal, to_light);
     const V r = hn::Mul(hn::Mul(f.x, geometry), hn::Set(d, intensity.x));
     const V g = hn::Mul(hn::Mul(f.y, geometry), hn::Set(d, intensity.y));
     const V b = hn::Mul(hn::Mul(f.z, geometry), hn::Set(d, intensity.z));
@@ -57,8 +57,9 @@ HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, co
 template <VplKind kKind>
 HWY_INLINE size_t LightKind(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points,
                             size_t first, size_t count, LitPoints& lit, const uint16_t* wanted) {
-  return points.glossy() ? Light<kKind, true>(light, intensity, clamp2, points, first, count, lit, wanted)
-                         : Light<kKind, false>(light, intensity, clamp2, points, first, count, lit, wanted);
+  if (points.ggx()) return Light<kKind, Lobes::ggx>(light, intensity, clamp2, points, first, count, lit, wanted);
+  return points.glossy() ? Light<kKind, Lobes::cosine>(light, intensity, clamp2, points, first, count, lit, wanted)
+                         : Light<kKind, Lobes::none>(light, intensity, clamp2, points, first, count, lit, wanted);
 }
 
 size_t LightPoints(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,

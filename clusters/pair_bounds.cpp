@@ -18,7 +18,7 @@ namespace lumicut::HWY_NAMESPACE {
 HWY_INLINE V3 Add3(const V3& a, const V3& b) { return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)}; }
 HWY_INLINE V3 Sub3(const V3& a, const V3& b) { return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)}; }
 
-template <VplKind kKind, bool kGlossy>
+template <VplKind kKind, Lobes kLobes>
 HWY_INLINE void PairBoundsOf(const LightNode& node, const PointNodes& nodes, float clamp2, float* HWY_RESTRICT bounds) {
   const D d;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
@@ -55,7 +55,7 @@ HWY_INLINE void PairBoundsOf(const LightNode& node, const PointNodes& nodes, flo
     cosine = WidenByCone(d, cosine, hn::Load(d, nodes.normal_cos + i), hn::Load(d, nodes.normal_sin + i));
     geometry = hn::Mul(geometry, hn::Max(zero, cosine));
     V3 f = Load3(d, nodes.diffuse, i);
-    if constexpr (kGlossy) {
+    if constexpr (kLobes != Lobes::none) {
       const V3 mirror = Load3(d, nodes.mirror, i), specular = Load3(d, nodes.specular, i);
       V beta;
       if constexpr (kKind == VplKind::directional)
@@ -65,7 +65,21 @@ HWY_INLINE void PairBoundsOf(const LightNode& node, const PointNodes& nodes, flo
                            mirror);
       beta = WidenByCone(d, beta, hn::Load(d, nodes.mirror_cos + i), hn::Load(d, nodes.mirror_sin + i));
       const V lobe = BoundOfLobe(d, beta, hn::Load(d, nodes.shininess + i));
-      f = {hn::MulAdd(specular.x, lobe, f.x), hn::MulAdd(specular.y, lobe, f.y), hn::MulAdd(specular.z, lobe, f.z)};
+      if constexpr (kLobes == Lobes::cosine)
+        f = {hn::MulAdd(specular.x, lobe, f.x), hn::MulAdd(specular.y, lobe, f.y), hn::MulAdd(specular.z, lobe, f.z)};
+      if constexpr (kLobes == Lobes::ggx) {
+        V3 gloss{hn::Mul(specular.x, lobe), hn::Mul(specular.y, lobe), hn::Mul(specular.z, lobe)};
+        const V nv = hn::Load(d, nodes.view_cosine + i);
+        const V ggx =
+            BoundOfGgxLobe(d, beta, cosine, hn::Load(d, nodes.alpha2_low + i), hn::Load(d, nodes.alpha2_high + i), nv);
+        const V3 share =
+            BoundOfSchlick(d, Load3(d, nodes.schlick, i), Load3(d, nodes.grazing, i), BoundOfFresnel(d, beta, nv));
+        // A point has one of the two lobes.
+        gloss = {hn::Max(gloss.x, hn::Mul(share.x, ggx)), hn::Max(gloss.y, hn::Mul(share.y, ggx)),
+                 hn::Max(gloss.z, hn::Mul(share.z, ggx))};
+        const V fading = BoundOfFading(d, hn::Load(d, nodes.fade + i), cosine);
+        f = {hn::MulAdd(f.x, fading, gloss.x), hn::MulAdd(f.y, fading, gloss.y), hn::MulAdd(f.z, fading, gloss.z)};
+      }
     }
     hn::StoreU(BoundOfLuminance(d, f, geometry, node.intensity), d, bounds + i);
   }
@@ -73,8 +87,9 @@ HWY_INLINE void PairBoundsOf(const LightNode& node, const PointNodes& nodes, flo
 
 template <VplKind kKind>
 HWY_INLINE void PairBoundsOfKind(const LightNode& node, const PointNodes& nodes, float clamp2, float* bounds) {
-  nodes.glossy ? PairBoundsOf<kKind, true>(node, nodes, clamp2, bounds)
-               : PairBoundsOf<kKind, false>(node, nodes, clamp2, bounds);
+  if (nodes.ggx) return PairBoundsOf<kKind, Lobes::ggx>(node, nodes, clamp2, bounds);
+  nodes.glossy ? PairBoundsOf<kKind, Lobes::cosine>(node, nodes, clamp2, bounds)
+               : PairBoundsOf<kKind, Lobes::none>(node, nodes, clamp2, bounds);
 }
 
 void PairBounds(const LightNode& node, const PointNodes& nodes, float clamp2, float* bounds) {
@@ -121,20 +136,31 @@ void pair_distances2(const LightNode& node, const PointNodes& nodes, float clamp
 
 void PointNodes::set(size_t lane, const ShadePoints& points, size_t first, size_t count) {
   Aabb box, normals, mirrors;
-  Rgb kd{}, ks{};
-  float least = std::numeric_limits<float>::infinity();
+  Rgb kd{}, ks{}, f0{}, f90{};
+  constexpr float kMost = std::numeric_limits<float>::infinity();
+  float least = kMost, low2 = kMost, high2 = 0.0f, view = 1.0f, fades = kMost;
   for (size_t i = first; i < first + count; ++i) {
     box.extend(points.position_at(i));
     normals.extend(points.normal_at(i));
     kd = max(kd, Rgb{points.diffuse[0][i], points.diffuse[1][i], points.diffuse[2][i]});
     const Rgb s{points.specular[0][i], points.specular[1][i], points.specular[2][i]};
-    if (!(max_component(s) > 0.0f)) continue;
-    ks = max(ks, s);
-    mirrors.extend(Vec3f{points.mirror[0][i], points.mirror[1][i], points.mirror[2][i]});
-    least = std::min(least, points.shininess[i]);
+    fades = std::min(fades, points.fade[i]);
+    const Rgb edge{points.grazing[0][i], points.grazing[1][i], points.grazing[2][i]};
+    if (!(max_component(s) > 0.0f || max_component(edge) > 0.0f)) continue;
+    const Vec3f m{points.mirror[0][i], points.mirror[1][i], points.mirror[2][i]};
+    mirrors.extend(m);
+    if (const float n = points.shininess[i]; n < 0.0f) {
+      f0 = max(f0, s), f90 = max(f90, edge);
+      low2 = std::min(low2, n * n), high2 = std::max(high2, n * n);
+      view = std::min(view, dot(points.normal_at(i), m));
+    } else {
+      ks = max(ks, s);
+      least = std::min(least, n);
+    }
   }
   const bool shiny = !mirrors.empty();
   glossy = glossy || shiny;
+  ggx = ggx || high2 > 0.0f || fades > 0.0f;
   used |= 1u << lane;
   const auto put = [lane](float(&to)[3][kLanes], const Vec3f& v) {
     for (int k = 0; k < 3; ++k) to[k][lane] = v[k];
@@ -149,16 +175,21 @@ void PointNodes::set(size_t lane, const ShadePoints& points, size_t first, size_
   normal_cos[lane] = facing.cos_half, normal_sin[lane] = facing.sin_half();
   mirror_cos[lane] = shine.cos_half, mirror_sin[lane] = shine.sin_half();
   put(diffuse, kd), put(specular, ks);
-  shininess[lane] = shiny ? least : 0.0f;
+  shininess[lane] = least < kMost ? least : 0.0f;
+  put(schlick, f0), put(grazing, f90);
+  view_cosine[lane] = view, fade[lane] = fades;
+  alpha2_low[lane] = high2 > 0.0f ? low2 : 1.0f, alpha2_high[lane] = high2 > 0.0f ? high2 : 1.0f;
 }
 
 void PointNodes::pad(size_t lane) {
   const auto copy = [lane](float(&a)[kLanes]) { std::fill(a + lane, a + kLanes, a[lane - 1]); };
   for (int k = 0; k < 3; ++k)
     for (auto* a : {&center, &half, &normal, &tangent, &bitangent, &mirror, &mirror_tangent, &mirror_bitangent,
-                    &diffuse, &specular})
+                    &diffuse, &specular, &schlick, &grazing})
       copy((*a)[k]);
-  for (auto* a : {&normal_cos, &normal_sin, &mirror_cos, &mirror_sin, &shininess, &radius2}) copy(*a);
+  for (auto* a : {&normal_cos, &normal_sin, &mirror_cos, &mirror_sin, &shininess, &radius2, &alpha2_low, &alpha2_high,
+                  &view_cosine, &fade})
+    copy(*a);
 }
 
 }  // namespace lumicut

@@ -15,10 +15,14 @@ struct alignas(64) PointNodes {
   float mirror[3][kLanes], mirror_tangent[3][kLanes], mirror_bitangent[3][kLanes], mirror_cos[kLanes],
       mirror_sin[kLanes];
   float diffuse[3][kLanes], specular[3][kLanes];  // largest of the points, channel by channel
-  float shininess[kLanes];                        // least of the glossy points
+  float shininess[kLanes];                        // least of Blinn's and Phong's points
+  float schlick[3][kLanes], grazing[3][kLanes];   // F0 and F90: largest of the GGX points, channel by channel
+  float alpha2_low[kLanes], alpha2_high[kLanes];  // least and largest α² of the GGX points
+  float view_cosine[kLanes];                      // least cosine of a GGX point's normal to the viewer
+  float fade[kLanes];                             // least of all points
   float radius2[kLanes];                          // squared half diagonal of the box
   uint32_t used = 0;                              // bits of the lanes that hold points; the others hold copies
-  bool glossy = false;                            // any of the points
+  bool glossy = false, ggx = false;               // any of the points
 
   // Lane `lane` becomes the cluster of points [first, first + count) of `points`, count > 0.
   void set(size_t lane, const ShadePoints& points, size_t first, size_t count);

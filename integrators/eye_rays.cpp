@@ -84,7 +84,7 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
     const float survive = std::min(1.0f, max_component(shown));
     if (!(rngs[i].next_float() < survive)) continue;
     const Rgb factor = weights[i] / survive;
-    point.diffuse = point.diffuse * factor, point.specular = point.specular * factor;
+    point.attenuate(factor);
     hits.points.push(point);
   }
   hits.points.finish();

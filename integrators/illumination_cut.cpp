@@ -16,6 +16,7 @@
 #include "core/parallel.h"
 #include "core/rng.h"
 #include "integrators/integrator.h"
+#include "scene/bsdf.h"
 
 namespace lumicut {
 
@@ -41,7 +42,9 @@ struct GroupItem {
 
 // Share of the light that a surface sends back, to first order: what turns irradiance into radiance.
 float reflectance(const SurfacePoint& p) {
-  return luminance(p.diffuse) + luminance(p.specular) * (2.0f / (p.shininess + 1.0f));
+  const float specular = p.ggx() ? luminance(specular_albedo(p)) * std::numbers::inv_pi_v<float>
+                                 : luminance(p.specular) * (2.0f / (p.shininess + 1.0f));
+  return luminance(p.diffuse) + specular;
 }
 
 // Working memory of one region.

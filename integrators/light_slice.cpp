@@ -145,6 +145,8 @@ class LightSlice final : public Integrator {
     const float d = diffuse + specular > 0.0f ? std::max(diffuse, 1e-3f * specular) : 1.0f;
     p.diffuse = {d, d, d};
     p.specular = {specular, specular, specular};
+    const float edge = luminance(p.grazing);
+    p.grazing = {edge, edge, edge};
     return p;
   }
 

@@ -190,7 +190,7 @@ class PathTracer final : public Integrator {
       if (!(path.rng.next_float() < survive)) return false;
       factor = factor / survive;
     }
-    path.point.diffuse = path.point.diffuse * factor, path.point.specular = path.point.specular * factor;
+    path.point.attenuate(factor);
     return true;
   }
 

@@ -14,6 +14,7 @@
 #include "core/parallel.h"
 #include "core/rng.h"
 #include "integrators/integrator.h"
+#include "scene/bsdf.h"
 
 namespace lumicut {
 
@@ -213,7 +214,11 @@ class StochasticLightcuts final : public Integrator {
     const float cosine = best_cosine(point.normal);
     if (!(cosine > 0.0f)) return {0.0f, 0.0f};
     float reflected = luminance(point.diffuse);
-    if (const float specular = luminance(point.specular); specular > 0.0f) {
+    if (const float specular = luminance(point.specular); point.ggx()) {
+      const float nv = dot(point.normal, point.mirror);
+      reflected +=
+          luminance(specular_albedo(point)) * ggx_lobe_bound(-point.shininess, nv, cosine, best_cosine(point.mirror));
+    } else if (specular > 0.0f) {
       const float beta = best_cosine(point.mirror);
       if (beta > 0.0f) reflected += specular * std::pow(beta, point.shininess);
     }

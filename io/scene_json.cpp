@@ -250,11 +250,27 @@ class SceneReader {
     colour("diffuse", m.diffuse, 1);
     colour("specular", m.specular, 1);
     colour("emission", m.emission, 1e15);
-    m.shininess = static_cast<float>(object.number("shininess", static_cast<double>(m.shininess), 0, 1e6));
     if (auto opacity = object.find("opacity")) m.opacity = std::max(kHole, static_cast<float>(opacity->number(0, 1)));
-    if (auto model = object.find("model"))
-      m.flags = (m.flags & ~uint32_t{LUMICUT_PHONG}) |
-                (model->choice({"blinn", "phong"}) == 1 ? uint32_t{LUMICUT_PHONG} : 0u);
+    if (auto model = object.find("model")) {
+      constexpr uint32_t kFlags[] = {0, LUMICUT_PHONG, LUMICUT_GGX};
+      const uint32_t before = m.flags;
+      m.flags = (m.flags & ~uint32_t{LUMICUT_PHONG | LUMICUT_GGX}) | kFlags[model->choice({"blinn", "phong", "ggx"})];
+      // Of another meaning there: a multiple of the reflectance that the index of refraction gives.
+      if ((m.flags & ~before & LUMICUT_GGX) != 0 && !object.has("specular"))
+        for (float& c : m.specular) c = 1.0f;
+    }
+    const bool ggx = (m.flags & LUMICUT_GGX) != 0;
+    const auto number = [&](const char* key, float& out, double low, double high, bool of_model) {
+      const auto value = object.find(key);
+      if (!value) return;
+      if (!of_model) value->fail(ggx ? "is not of the model \"ggx\"" : "is of the model \"ggx\" alone");
+      out = static_cast<float>(value->number(low, high));
+    };
+    number("shininess", m.shininess, 0, 1e6, !ggx);
+    number("roughness", m.roughness, 0, 1, ggx);
+    number("metallic", m.metallic, 0, 1, ggx);
+    number("ior", m.ior, 0.1, 10, ggx);
+    number("transmission", m.transmission, 0, 1, ggx);
     if (auto both = object.find("emit_both_sides"))
       m.flags =
           (m.flags & ~uint32_t{LUMICUT_EMIT_BOTH_SIDES}) | (both->boolean() ? uint32_t{LUMICUT_EMIT_BOTH_SIDES} : 0u);
@@ -283,6 +299,9 @@ class SceneReader {
     texture("specular_texture", m.specular_texture, TextureUse::colour);
     texture("opacity_texture", m.opacity_texture, TextureUse::mask);
     texture("emission_texture", m.emission_texture, TextureUse::colour);
+    texture("normal_texture", m.normal_texture, TextureUse::vectors);
+    if (auto strength = object.find("normal_strength"))
+      m.normal_strength = static_cast<float>(strength->number(1e-3, 10));
   }
 
   void read_materials(const JsonValue& value) {

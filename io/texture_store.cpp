@@ -42,6 +42,8 @@ Texture read_texture(const std::string& path, TextureUse use, uint32_t flags, co
     out = 1;
     if (in == 2 || in == 4) first = in - 1;
   }
+  if (use == TextureUse::vectors && out != 3)
+    throw FileError(path, fmt::format("has {} channels; a normal map (of {}) needs 3", in, user));
   texture.channels = static_cast<uint32_t>(out);
   const size_t pixels = size_t{texture.width} * texture.height;
   const auto read = [&](auto& kept, OIIO::TypeDesc type) {

@@ -12,6 +12,7 @@ namespace lumicut::io {
 enum class TextureUse {
   colour,   // integer images hold sRGB, float images linear values; grey or red, green and blue
   mask,     // one linear channel: the alpha of images that have one, else the first channel
+  vectors,  // linear, three channels: normal maps
   radiance  // an environment: linear floats, finite and not negative
 };
 

@@ -60,22 +60,34 @@ Texture to_texture(const lumicut_texture& in, uint64_t index) {
 
 Material to_material(const lumicut_material& in, uint64_t index) {
   const Checked c("lumicut_material", index);
-  c.flags("flags", in.flags, LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG);
+  c.flags("flags", in.flags, LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG | LUMICUT_GGX);
+  if ((in.flags & LUMICUT_PHONG) != 0 && (in.flags & LUMICUT_GGX) != 0)
+    c.fail("flags", "holds both LUMICUT_PHONG and LUMICUT_GGX");
   c.range("diffuse", in.diffuse, 0.0f, 1.0f);
   c.range("specular", in.specular, 0.0f, 1.0f);
   c.range("shininess", in.shininess, 0.0f, 1e6f);
   c.range("opacity", in.opacity, 0.0f, 1.0f);
   c.not_negative("emission", in.emission);
+  c.range("roughness", in.roughness, 0.0f, 1.0f);
+  c.range("metallic", in.metallic, 0.0f, 1.0f);
+  if (in.ior != 0.0f) c.range("ior", in.ior, 0.1f, 10.0f);
+  c.range("transmission", in.transmission, 0.0f, 1.0f);
   Material m;
   m.diffuse = vec(in.diffuse);
   m.specular = vec(in.specular);
   m.shininess = in.shininess;
-  m.phong = (in.flags & LUMICUT_PHONG) != 0;
+  if ((in.flags & LUMICUT_PHONG) != 0) m.lobe = LobeModel::phong;
+  if ((in.flags & LUMICUT_GGX) != 0) m.lobe = LobeModel::ggx;
+  m.roughness = in.roughness, m.metallic = in.metallic, m.transmission = in.transmission;
+  m.ior = in.ior == 0.0f ? 1.5f : in.ior;
   m.opacity = in.opacity == 0.0f ? 1.0f : in.opacity;
   m.emission = vec(in.emission);
   m.emit_both_sides = (in.flags & LUMICUT_EMIT_BOTH_SIDES) != 0;
   m.diffuse_texture = texture_index(c, "diffuse_texture", in.diffuse_texture);
   m.specular_texture = texture_index(c, "specular_texture", in.specular_texture);
+  m.normal_texture = texture_index(c, "normal_texture", in.normal_texture);
+  c.range("normal_strength", in.normal_strength, 0.0f, 10.0f);
+  m.normal_strength = in.normal_strength == 0.0f ? 1.0f : in.normal_strength;
   m.opacity_texture = texture_index(c, "opacity_texture", in.opacity_texture);
   m.emission_texture = texture_index(c, "emission_texture", in.emission_texture);
   return m;

@@ -32,7 +32,9 @@ uint64_t scene_hash(const Scene& scene) {
   const auto add = [&](const Vec3f& v) { values.insert(values.end(), {v.x, v.y, v.z}); };
   for (const Material& m : scene.materials()) {
     add(m.diffuse), add(m.specular), add(m.emission);
-    values.insert(values.end(), {m.shininess, m.opacity, static_cast<float>(m.diffuse_texture)});
+    values.insert(values.end(), {m.shininess, m.opacity, static_cast<float>(m.diffuse_texture),
+                                 static_cast<float>(m.lobe), m.roughness, m.metallic, m.ior, m.transmission,
+                                 m.normal_strength, static_cast<float>(m.normal_texture)});
   }
   for (const Light& l : scene.lights()) {
     add(l.value), add(l.position), add(l.direction), add(l.u), add(l.v);

@@ -117,6 +117,7 @@ void Scene::check_references() const {
     check_texture(materials_[i].specular_texture, i, "specular_texture");
     check_texture(materials_[i].opacity_texture, i, "opacity_texture");
     check_texture(materials_[i].emission_texture, i, "emission_texture");
+    check_texture(materials_[i].normal_texture, i, "normal_texture");
   }
   if (environment_.texture >= 0 && static_cast<size_t>(environment_.texture) >= textures_.size())
     fail_argument("environment.texture = " + std::to_string(environment_.texture) + " is out of range: the scene has " +
@@ -226,8 +227,37 @@ SurfaceHit Scene::surface(const RayHit& rh) const {
   if (!mesh.uvs.empty()) {
     const Vec2f a = mesh.uvs[tri[0]], b = mesh.uvs[tri[1]], c = mesh.uvs[tri[2]];
     s.uv = {a.x * w + b.x * hit.u + c.x * hit.v, a.y * w + b.y * hit.u + c.y * hit.v};
+    if (const Material& material = materials_[s.material]; material.normal_texture >= 0)
+      s.normal = mapped_normal(material, s, {p[1] - p[0], p[2] - p[0]}, {a, b, c});
   }
   return s;
+}
+
+// The tangent is the triangle's own direction of growing u, laid into the shading normal's plane: seams of the map
+// between triangles are not smoothed over.
+Vec3f Scene::mapped_normal(const Material& material, const SurfaceHit& hit, const Vec3f (&edges)[2],
+                           const Vec2f (&corners)[3]) const {
+  const Vec2f d1{corners[1].x - corners[0].x, corners[1].y - corners[0].y},
+      d2{corners[2].x - corners[0].x, corners[2].y - corners[0].y};
+  const float det = d1.x * d2.y - d2.x * d1.y;
+  if (!(std::abs(det) > 0.0f)) return hit.normal;
+  const float sign = det < 0.0f ? -1.0f : 1.0f;
+  const Vec3f along_u = (edges[0] * d2.y - edges[1] * d1.y) * sign,
+              along_v = (edges[1] * d1.x - edges[0] * d2.x) * sign;
+  const Vec3f t = normalize(along_u - hit.normal * dot(along_u, hit.normal));
+  if (t == Vec3f{} || !is_finite(t)) return hit.normal;
+  Vec3f b = cross(hit.normal, t);
+  if (dot(b, along_v) < 0.0f) b = -b;
+  const Rgb c = textures_[material.normal_texture].color(hit.uv.x, hit.uv.y);
+  const Vec3f local = normalize(Vec3f{2.0f * c.x - 1.0f, 2.0f * c.y - 1.0f, std::max(0.0f, 2.0f * c.z - 1.0f)});
+  if (local == Vec3f{}) return hit.normal;
+  const Vec3f bent = t * local.x + b * local.y + hit.normal * local.z;
+  Vec3f n = normalize(hit.normal + (bent - hit.normal) * material.normal_strength);
+  // Not below the surface itself.
+  constexpr float kLeast = 0.02f;
+  if (const float up = dot(n, hit.geometric_normal); up < kLeast)
+    n = normalize(n + hit.geometric_normal * (kLeast - up));
+  return n == Vec3f{} ? hit.normal : n;
 }
 
 SurfacePoint Scene::shade_point(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const {
@@ -241,22 +271,67 @@ SurfacePoint Scene::shade_point(const Vec3f& position, const Vec3f& geometric_no
   SurfacePoint p;
   p.position = position + geometric_normal * (behind ? -epsilon_ : epsilon_);
   p.normal = behind ? -normal : normal;
-  p.mirror = normalize(reflect(to_viewer, p.normal));
-  p.diffuse = diffuse_color(material_index, uv) * kInvPi;
-  p.specular = specular_color(material_index, uv) * lobe_scale(material.phong, material.shininess);
-  p.shininess = material.shininess;
   p.pixel = pixel;
+  if (material.lobe == LobeModel::ggx) {
+    set_ggx(material, ggx_colors(material_index, uv), to_viewer, p);
+    return p;
+  }
+  p.mirror = normalize(reflect(to_viewer, p.normal));
+  p.diffuse = diffuse_texel(material, uv) * kInvPi;
+  p.specular = specular_texel(material, uv) * lobe_scale(material.lobe == LobeModel::phong, material.shininess);
+  p.shininess = material.shininess;
   return p;
+}
+
+void Scene::set_ggx(const Material& material, const GgxColors& colors, const Vec3f& to_viewer, SurfacePoint& p) const {
+  // Bent shading normals may turn from the viewer: seen edge-on then.
+  constexpr float kEdge = 0.01f;
+  float cosine = dot(p.normal, to_viewer);
+  Vec3f view = to_viewer;
+  if (cosine < kEdge) view = normalize(view + p.normal * (kEdge - cosine)), cosine = kEdge;
+  p.mirror = normalize(reflect(view, p.normal));
+  const float alpha = std::max(kLeastAlpha, material.alpha());
+  const GgxBase base = ggx_base(colors, material.alpha());
+  const float m = 1.0f - std::min(1.0f, cosine);
+  p.diffuse = base.scale * ((1.0f - base.fade * (m * m) * (m * m)) * kInvPi);
+  p.fade = base.fade;
+  p.shininess = -alpha;
+  if (material.alpha() >= kLeastAlpha) p.specular = colors.specular, p.grazing = Rgb{1, 1, 1} * colors.grazing;
+}
+
+Rgb Scene::diffuse_texel(const Material& m, Vec2f uv) const {
+  return m.diffuse_texture < 0 ? m.diffuse : m.diffuse * textures_[m.diffuse_texture].color(uv.x, uv.y);
+}
+
+Rgb Scene::specular_texel(const Material& m, Vec2f uv) const {
+  return m.specular_texture < 0 ? m.specular : m.specular * textures_[m.specular_texture].color(uv.x, uv.y);
 }
 
 Rgb Scene::diffuse_color(uint32_t material, Vec2f uv) const {
   const Material& m = materials_[material];
-  return m.diffuse_texture < 0 ? m.diffuse : m.diffuse * textures_[m.diffuse_texture].color(uv.x, uv.y);
+  const Rgb color = diffuse_texel(m, uv);
+  return m.lobe == LobeModel::ggx ? color * ((1.0f - m.metallic) * (1.0f - m.transmission)) : color;
 }
 
 Rgb Scene::specular_color(uint32_t material, Vec2f uv) const {
   const Material& m = materials_[material];
-  return m.specular_texture < 0 ? m.specular : m.specular * textures_[m.specular_texture].color(uv.x, uv.y);
+  return m.lobe == LobeModel::ggx ? ggx_colors(material, uv).specular : specular_texel(m, uv);
+}
+
+GgxColors Scene::ggx_colors(uint32_t material, Vec2f uv) const {
+  const Material& m = materials_[material];
+  GgxColors c;
+  c.base = diffuse_texel(m, uv);
+  c.metal = m.metallic;
+  c.clear = (1.0f - m.metallic) * m.transmission;
+  c.opaque = (1.0f - m.metallic) * (1.0f - m.transmission);
+  const float r = (m.ior - 1.0f) / (m.ior + 1.0f);
+  c.f0 = specular_texel(m, uv) * (r * r);
+  c.specular = c.base * c.metal + c.f0 * c.opaque;
+  // What hardly reflects has no bright edge either.
+  const auto edge = [](const Rgb& f0) { return std::min(1.0f, 50.0f * max_component(f0)); };
+  c.grazing = edge(c.base) * c.metal + edge(c.f0) * c.opaque;
+  return c;
 }
 
 Rgb Scene::emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const {

@@ -96,15 +96,17 @@ class Scene final : private HitFilter {
     return instanced_ ? first_instance_[mesh] + index : kNoId;
   }
 
-  // Makes a hit of `accel()` whole.
+  // Makes a hit of `accel()` whole. Normal maps turn its shading normal; a host's own points bring theirs.
   SurfaceHit surface(const RayHit& hit) const;
   // The point to shade at a surface seen from direction `to_viewer` (unit, away from the surface).
   SurfacePoint shade_point(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const;
   // The same for a host's own point. `material` must be in range (checked by the caller).
   SurfacePoint shade_point(const Vec3f& position, const Vec3f& geometric_normal, const Vec3f& normal, Vec2f uv,
                            uint32_t material, const Vec3f& to_viewer, uint32_t pixel) const;
+  // kd and ks; of GGX materials what is diffuse beneath the coat, and F0 of metal and coat.
   Rgb diffuse_color(uint32_t material, Vec2f uv) const;
   Rgb specular_color(uint32_t material, Vec2f uv) const;
+  GgxColors ggx_colors(uint32_t material, Vec2f uv) const;
   // Radiance emitted by a surface towards `to_viewer`.
   Rgb emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const;
   // Radiance of the environment seen along `direction` (unit).
@@ -113,6 +115,12 @@ class Scene final : private HitFilter {
   Vec2f environment_uv(const Vec3f& direction) const;
 
  private:
+  // `edges`: from the triangle's first corner to the others. `corners`: its uvs.
+  Vec3f mapped_normal(const Material& material, const SurfaceHit& hit, const Vec3f (&edges)[2],
+                      const Vec2f (&corners)[3]) const;
+  Rgb diffuse_texel(const Material& material, Vec2f uv) const;
+  Rgb specular_texel(const Material& material, Vec2f uv) const;
+  void set_ggx(const Material& material, const GgxColors& colors, const Vec3f& to_viewer, SurfacePoint& point) const;
   bool passes(uint32_t mesh, uint32_t prim, float u, float v) const override;
   void check_references() const;
 

@@ -6,8 +6,9 @@ namespace {
 // Every float array of the structure, so that no member function can forget one.
 template <typename Points, typename Fn>
 void for_each_array(Points& p, Fn fn) {
-  for (int k = 0; k < 3; ++k) fn(p.position[k]), fn(p.normal[k]), fn(p.mirror[k]), fn(p.diffuse[k]), fn(p.specular[k]);
-  fn(p.shininess);
+  for (int k = 0; k < 3; ++k)
+    fn(p.position[k]), fn(p.normal[k]), fn(p.mirror[k]), fn(p.diffuse[k]), fn(p.specular[k]), fn(p.grazing[k]);
+  fn(p.shininess), fn(p.fade);
 }
 }  // namespace
 
@@ -15,7 +16,7 @@ void ShadePoints::clear() {
   for_each_array(*this, [](auto& a) { a.clear(); });
   pixel.clear();
   size_ = 0;
-  glossy_ = false;
+  glossy_ = ggx_ = false;
 }
 
 void ShadePoints::reserve(size_t n) {
@@ -31,10 +32,12 @@ void ShadePoints::push(const SurfacePoint& p) {
     mirror[k].push_back(p.mirror[k]);
     diffuse[k].push_back(p.diffuse[k]);
     specular[k].push_back(p.specular[k]);
+    grazing[k].push_back(p.grazing[k]);
   }
-  shininess.push_back(p.shininess);
+  shininess.push_back(p.shininess), fade.push_back(p.fade);
   pixel.push_back(p.pixel);
-  glossy_ = glossy_ || max_component(p.specular) > 0.0f;
+  ggx_ = ggx_ || p.ggx();
+  glossy_ = glossy_ || p.ggx() || max_component(p.specular) > 0.0f;
   ++size_;
 }
 
@@ -47,7 +50,8 @@ void ShadePoints::finish() {
 
 SurfacePoint ShadePoints::get(size_t i) const {
   const auto at = [i](const std::vector<float>(&a)[3]) { return Vec3f{a[0][i], a[1][i], a[2][i]}; };
-  return {at(position), at(normal), at(mirror), at(diffuse), at(specular), shininess[i], pixel[i]};
+  return {at(position), at(normal), at(mirror),  at(diffuse), at(specular),
+          shininess[i], pixel[i],   at(grazing), fade[i]};
 }
 
 }  // namespace lumicut

@@ -14,23 +14,31 @@ inline constexpr size_t round_up_to_lanes(size_t n) { return (n + kLanes - 1) / 
 
 // A surface seen from one side: the shading normal is turned to the viewer.
 struct SurfacePoint {
-  Vec3f position;  // offset from the surface by the scene's epsilon: shadow rays start here
-  Vec3f normal;    // unit, on the viewer's side
-  Vec3f mirror;    // unit: the view direction mirrored about `normal`
-  Rgb diffuse;     // kd/π
-  Rgb specular;    // ks · lobe_scale: radiance factor is specular·cosⁿβ·cosθ
-  float shininess = 0.0f;
-  uint32_t pixel = 0;  // points of one pixel lie together
+  Vec3f position;          // offset from the surface by the scene's epsilon: shadow rays start here
+  Vec3f normal;            // unit, on the viewer's side
+  Vec3f mirror;            // unit: the view direction mirrored about `normal`
+  Rgb diffuse;             // kd/π
+  Rgb specular;            // ks · lobe_scale: radiance factor is specular·cosⁿβ·cosθ
+  float shininess = 0.0f;  // GGX: −α; `specular` is then the reflectance at normal incidence, F0
+  uint32_t pixel = 0;      // points of one pixel lie together
+  Rgb grazing{};           // GGX: reflectance at grazing incidence, F90
+  float fade = 0.0f;       // the diffuse part falls with the light's cosine c as 1 − fade·(1 − c)⁴
+
+  bool ggx() const { return shininess < 0.0f; }
+  // All light that it reflects, times `factor`: what a path has lost on its way here.
+  void attenuate(const Rgb& factor) { diffuse *= factor, specular *= factor, grazing *= factor; }
 };
 
 struct ShadePoints {
-  // position, normal, mirror, diffuse, specular: [component][point]
-  std::vector<float> position[3], normal[3], mirror[3], diffuse[3], specular[3], shininess;
+  // position, normal, mirror, diffuse, specular, grazing: [component][point]
+  std::vector<float> position[3], normal[3], mirror[3], diffuse[3], specular[3], grazing[3], shininess, fade;
   std::vector<uint32_t> pixel;
 
   size_t size() const { return size_; }
   // True where any point has a glossy lobe; loops skip it otherwise.
   bool glossy() const { return glossy_; }
+  // True where any point is GGX's.
+  bool ggx() const { return ggx_; }
   void clear();
   void reserve(size_t n);
   void push(const SurfacePoint& p);
@@ -42,7 +50,7 @@ struct ShadePoints {
 
  private:
   size_t size_ = 0;
-  bool glossy_ = false;
+  bool glossy_ = false, ggx_ = false;
 };
 
 }  // namespace lumicut

@@ -5,6 +5,8 @@
 
 #include <numbers>
 
+#include "scene/bsdf.h"
+#include "scene/followed.h"
 #include "vpl/emitters.h"
 
 namespace lumicut {
@@ -26,6 +28,31 @@ struct PathVpl {
   uint64_t path;
   Vpl vpl;
 };
+
+// Goes on from a GGX surface, along a followed lobe or by the reflectance that point lights shade. `wo`: back along the
+// path. False: it ends here.
+bool scatter_ggx(const Scene& scene, const SurfaceHit& surface, const SurfacePoint& point, const Vec3f& wo,
+                 LightPath& path) {
+  const float choice = path.rng.next_float(), u = path.rng.next_float(), v = path.rng.next_float();
+  const float lobe = path.rng.next_float();
+  const auto followed = follow(scene, surface, wo, lobe, u, v);
+  const float qf = followed ? std::min(1.0f, max_component(followed->weight)) : 0.0f;
+  const float qs = std::min(1.0f, max_component(Bsdf(point).albedo()));
+  const float survive = std::min(1.0f, qf + qs);
+  if (!(choice < survive)) return false;
+  const float p_followed = survive * qf / (qf + qs);
+  if (choice < p_followed) {
+    path.origin = followed->origin, path.direction = followed->direction;
+    path.flux = path.flux * followed->weight * (1.0f / p_followed);
+  } else {
+    const BsdfSample s = Bsdf(point).sample(lobe, u, v);
+    const bool behind = dot(surface.geometric_normal, wo) < 0.0f;
+    if (!(s.pdf > 0.0f) || (dot(s.direction, surface.geometric_normal) < 0.0f) != behind) return false;
+    path.origin = point.position, path.direction = s.direction;
+    path.flux = path.flux * s.weight * (1.0f / (survive - p_followed));
+  }
+  return max_component(path.flux) > 0.0f && is_finite(path.flux);
+}
 
 // Follows paths [first, last) in step, so that rays are traced in batches.
 std::vector<PathVpl> trace_paths(const Scene& scene, const Emitters& emitters, const VplOptions& options,
@@ -54,6 +81,18 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const Emitters& emitters, c
       const bool behind = dot(surface.geometric_normal, wo) < 0.0f;
       const Vec3f side = behind ? -surface.geometric_normal : surface.geometric_normal;
       const Vec3f normal = behind ? -surface.normal : surface.normal;
+      if (scene.materials()[surface.material].lobe == LobeModel::ggx) {
+        const SurfacePoint point = scene.shade_point(surface, wo, 0);
+        Vpl v;
+        v.position = surface.position, v.kind = VplKind::oriented, v.normal = normal, v.group = path.group;
+        // Lambertian, of the same flux.
+        v.intensity = path.flux * point.diffuse * mean_of_fading(point.fade);
+        if (max_component(v.intensity) > 0.0f && is_finite(v.intensity)) vpls.push_back({ids[i], v});
+        if (!scatter_ggx(scene, surface, point, wo, path)) continue;
+        paths[alive] = path;
+        ids[alive++] = ids[i];
+        continue;
+      }
       const Rgb kd = scene.diffuse_color(surface.material, surface.uv);
       const Rgb ks = scene.specular_color(surface.material, surface.uv);
       const Vec3f position = surface.position + side * scene.epsilon();
@@ -82,7 +121,8 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const Emitters& emitters, c
         path.direction =
             Frame(normalize(reflect(wo, normal))).to_world({sine * std::cos(phi), sine * std::sin(phi), cosine});
         // lobe·cosθ / pdf, with pdf = (n+1)/2π cosⁿβ
-        const float scale = lobe_scale(material.phong, n) * 2.0f * std::numbers::pi_v<float> / (n + 1.0f);
+        const float scale =
+            lobe_scale(material.lobe == LobeModel::phong, n) * 2.0f * std::numbers::pi_v<float> / (n + 1.0f);
         path.flux = path.flux * ks * (scale * std::max(0.0f, dot(path.direction, normal)) / (survive - p_diffuse));
       }
       if (!(dot(path.direction, side) > 0.0f) || !(max_component(path.flux) > 0.0f)) continue;

@@ -131,7 +131,7 @@ class Writer:
         """File of the 1-based image for "colour" (PNGs are sRGB), "mask" or "radiance" (EXR)."""
         image = self.data.images[number - 1]
         byte = image.pixels.dtype == np.uint8
-        as_png = byte and (use == "mask" or (use == "colour" and image.flags & library.SRGB))
+        as_png = byte and (use == "mask" or (use == "vectors" and not image.flags & library.SRGB) or (use == "colour" and image.flags & library.SRGB))
         key = number, as_png
         if key not in self.files:
             name = "textures/" + plain_name(os.path.splitext(image.name)[0], self.used, ".png" if as_png else ".exr")
@@ -145,8 +145,13 @@ class Writer:
         return {"file": name, **options} if options else name
 
     def material(self, name, m):
-        out = {"name": name, "diffuse": numbers(m.diffuse), "specular": numbers(m.specular),
-               "shininess": numbers([m.shininess])[0]}
+        out = {"name": name, "diffuse": numbers(m.diffuse), "specular": numbers(m.specular)}
+        if m.flags & library.GGX:
+            out["model"] = "ggx"
+            for key in ("roughness", "metallic", "ior", "transmission"):
+                out[key] = numbers([getattr(m, key)])[0]
+        else:
+            out["shininess"] = numbers([m.shininess])[0]
         if m.flags & library.PHONG:
             out["model"] = "phong"
         if m.opacity not in (0.0, 1.0):
@@ -154,6 +159,9 @@ class Writer:
         if any(m.emission):
             out["emission"] = numbers(m.emission)
             out["emit_both_sides"] = bool(m.flags & library.EMIT_BOTH_SIDES)
+        if m.normal_texture:
+            out["normal_texture"] = self.texture(m.normal_texture, "vectors")
+            out["normal_strength"] = numbers([m.normal_strength])[0]
         for slot, use in (("diffuse", "colour"), ("specular", "colour"), ("emission", "colour"), ("opacity", "mask")):
             number = getattr(m, slot + "_texture")
             if number:

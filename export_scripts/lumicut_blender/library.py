@@ -20,7 +20,7 @@ IDLE, RUNNING, DONE, STOPPED, FAILED = range(5)
 FLOAT, INT, BOOL, CHOICE = range(4)
 UINT8, FLOAT32 = 0, 1
 SRGB, CLAMP, NEAREST = 1, 2, 4
-EMIT_BOTH_SIDES, PHONG = 1, 2
+EMIT_BOTH_SIDES, PHONG, GGX = 1, 2, 4
 POINT, SPOT, RECTANGLE, DISK, SUN = range(5)
 RADIOMETRIC, WATT = 0, 1
 ENVIRONMENT_HIDDEN = 1
@@ -77,7 +77,8 @@ class Material(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("flags", c_uint32), ("diffuse", c_float * 3), ("shininess", c_float),
                 ("specular", c_float * 3), ("opacity", c_float), ("emission", c_float * 3),
                 ("diffuse_texture", c_int32), ("specular_texture", c_int32), ("opacity_texture", c_int32),
-                ("emission_texture", c_int32)]
+                ("emission_texture", c_int32), ("roughness", c_float), ("metallic", c_float), ("ior", c_float),
+                ("transmission", c_float), ("normal_texture", c_int32), ("normal_strength", c_float)]
 
 
 class Mesh(Descriptor):
@@ -131,7 +132,7 @@ class ChannelInfo(Descriptor):
 
 
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
-SIZES = {DeviceDesc: 32, Status: 48, SceneDesc: 16, Texture: 32, Material: 68, Mesh: 88, Light: 100, Environment: 64,
+SIZES = {DeviceDesc: 32, Status: 48, SceneDesc: 16, Texture: 32, Material: 92, Mesh: 88, Light: 100, Environment: 64,
          Camera: 92, IntegratorInfo: 40, ParamInfo: 72, RenderDesc: 36, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32

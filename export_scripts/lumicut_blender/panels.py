@@ -276,11 +276,11 @@ class LUMICUT_PT_material_viewport(Panel, bpy.types.Panel):
         return super().poll(context) and context.material is not None
 
     def draw(self, context):
-        from .materials import exponent_of
+        from .materials import MIRROR, roughness_of
         limit = context.scene.lumicut.max_shininess
-        rough = (0.5 / (limit + 0.5)) ** 0.25
-        wrapped(self.layout, f"Rendered as Lambert and one lobe. Roughness below {rough:.2f} is taken as {rough:.2f} "
-                             f"(Gloss Limit {limit:g}); roughness 0.5 is the exponent {exponent_of(0.5):.1f}.")
+        rough = roughness_of(limit)
+        wrapped(self.layout, f"Rendered as metal, glass or coated diffuse. Roughness below {MIRROR:g} is followed as a "
+                             f"mirror's, from there to {rough:.2f} taken as {rough:.2f} (Gloss Limit {limit:g}).")
 
 
 def menu(self, context):

@@ -126,7 +126,7 @@ def register():
         "samples": IntProperty(name="Samples", description="Samples a pixel, for edges, texture and depth of field. One lies at the pixel's centre",
                                default=4, min=1, max=65536, soft_max=64),
         "accel": EnumProperty(name="Tree for Rays", description="What finds the triangles that rays hit", items=ACCELS, default="agglomerative"),
-        "max_shininess": FloatProperty(name="Gloss Limit", description="Largest exponent of a glossy lobe. Sharper ones show the virtual lights as blots",
+        "max_shininess": FloatProperty(name="Gloss Limit", description="Sharpest glossy lobe that lights shade, as Blinn's exponent: sharper ones, up to mirrors, show the virtual lights as blots",
                                        default=300.0, min=1.0, max=100000.0),
         "viewport_lights": IntProperty(name="Viewport Lights", description="Virtual lights while the viewport renders",
                                        default=5000, min=100, max=1000000),

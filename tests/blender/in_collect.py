@@ -217,30 +217,69 @@ class MaterialTrees(unittest.TestCase):
     def test_principled_dielectric(self):
         m, _ = self.principled(**{"Base Color": (0.2, 0.4, 0.6, 1), "Roughness": 0.5, "Emission Strength": 0.0})
         out, notes, _ = the_material(m)
-        # Before 4.0 the diffuse part is Burley's, with 1.009 of Lambert's albedo at this roughness.
-        burley = 0.953 + 0.1123 * 0.5 if bpy.app.version < (4, 0, 0) else 1.0
+        # Before 4.0 the diffuse part is Burley's, with 1.009 of Lambert's albedo at this roughness, and not dimmed by
+        # the coat.
+        burley = (0.953 + 0.1123 * 0.5) / materials.dimming(0.04, 0.25) if bpy.app.version < (4, 0, 0) else 1.0
         np.testing.assert_allclose(out.diffuse, np.array((0.2, 0.4, 0.6)) * burley, rtol=1e-5)
         # 3.x: 0.08 specular 0.5; 4.x: ((1.45-1)/2.45)² or IOR 1.5's 4 %
-        self.assertTrue(all(0.03 < s < 0.045 for s in out.specular), list(out.specular))
-        self.assertAlmostEqual(out.shininess, 0.5 / 0.5**4 - 0.5, places=4)
-        self.assertTrue(any("Gloss" in n and "Stuff" in n for n in notes))
+        f0 = materials.normal_reflectance(out.ior)
+        self.assertTrue(all(0.03 < s * f0 < 0.045 for s in out.specular), (list(out.specular), out.ior))
+        self.assertTrue(out.flags & library.GGX)
+        self.assertEqual((out.roughness, out.metallic, out.transmission), (0.5, 0, 0))
 
     def test_principled_metal_and_emission_and_alpha(self):
         m, _ = self.principled(**{"Base Color": (0.9, 0.6, 0.3, 1), "Metallic": 1.0, "Roughness": 0.3,
                                   "Emission|Emission Color": (1, 0.5, 0, 1), "Emission Strength": 4.0, "Alpha": 0.3})
         out, notes, _ = the_material(m)
-        self.assertEqual(list(out.diffuse), [0, 0, 0])
-        np.testing.assert_allclose(out.specular, (0.9, 0.6, 0.3), rtol=1e-6)
+        np.testing.assert_allclose(out.diffuse, (0.9, 0.6, 0.3), rtol=1e-6)
+        self.assertEqual(out.metallic, 1)
+        self.assertAlmostEqual(out.roughness, 0.3, places=6)
         np.testing.assert_allclose(out.emission, (4, 2, 0), rtol=1e-6)
         self.assertTrue(out.flags & library.EMIT_BOTH_SIDES)
         self.assertLess(out.opacity, 0.5)
         self.assertTrue(any("Partial transparency" in n for n in notes))
 
     def test_the_gloss_limit_is_kept_and_reported(self):
-        m, _ = self.principled(**{"Roughness": 0.05})
+        m, _ = self.principled(**{"Roughness": 0.12})
         out, notes, _ = the_material(m, 300.0)
-        self.assertEqual(out.shininess, 300)
+        self.assertAlmostEqual(out.roughness, materials.roughness_of(300), places=6)
         self.assertTrue(any("gloss limit" in n and "Stuff" in n for n in notes))
+
+    def test_normal_maps(self):
+        m, node = self.principled()
+        texture = m.node_tree.nodes.new("ShaderNodeTexImage")
+        texture.image = self.image(srgb=False)
+        mapped = m.node_tree.nodes.new("ShaderNodeNormalMap")
+        mapped.inputs["Strength"].default_value = 0.5
+        m.node_tree.links.new(texture.outputs["Color"], mapped.inputs["Color"])
+        m.node_tree.links.new(mapped.outputs[0], node.inputs["Normal"])
+        out, notes, data = the_material(m)
+        self.assertEqual((out.normal_texture, out.normal_strength), (1, 0.5))
+        self.assertEqual(data.images[0].flags & library.SRGB, 0)
+        self.assertFalse(any("Normal" in n for n in notes), notes)
+
+    def test_mirrors_stay_mirrors(self):
+        m, _ = self.principled(**{"Roughness": 0.0, "Metallic": 1.0})
+        out, _, _ = the_material(m)
+        self.assertEqual((out.roughness, out.metallic), (0, 1))
+
+    def test_glass(self):
+        m = h.material("Bottle")
+        node = h.shader(m, "ShaderNodeBsdfGlass")
+        node.inputs["Color"].default_value, node.inputs["IOR"].default_value = (0.5, 0.8, 1, 1), 1.3
+        node.inputs["Roughness"].default_value = 0.0
+        out, notes, _ = the_material(m)
+        np.testing.assert_allclose(out.diffuse, (0.25, 0.64, 1), rtol=1e-5)  # of both borders
+        self.assertEqual((out.transmission, out.metallic, out.roughness), (1, 0, 0))
+        self.assertAlmostEqual(out.ior, 1.3, places=5)
+        self.assertTrue(any("Glass" in n and "Bottle" in n for n in notes))
+
+    def test_principled_with_half_transmission(self):
+        m, _ = self.principled(**{"Base Color": (0.6, 0.6, 0.6, 1), "Transmission|Transmission Weight": 0.5,
+                                  "Roughness": 0.0})
+        out, _, _ = the_material(m)
+        self.assertAlmostEqual(out.transmission, 0.5, delta=0.03)  # 3.x: Burley's albedo differs from Lambert's
+        self.assertEqual(out.roughness, 0)
 
     def test_a_room_of_principled_walls_is_as_bright_as_in_cycles(self):
         """Light that bounces: an albedo that is 5 % off makes the mean 15 % and more off."""
@@ -271,8 +310,9 @@ class MaterialTrees(unittest.TestCase):
         m.node_tree.links.new(b.outputs[0], mix.inputs[2])
         out, _, _ = the_material(m)
         np.testing.assert_allclose(out.diffuse, (0.6, 0.3, 0), atol=1e-6)
-        np.testing.assert_allclose(out.specular, (0.25, 0.25, 0.25), atol=1e-6)
-        self.assertAlmostEqual(out.shininess, materials.exponent_of(0.4), places=3)
+        f0 = np.array(out.specular) * materials.normal_reflectance(out.ior)
+        np.testing.assert_allclose(f0, (0.25, 0.25, 0.25), atol=1e-5)
+        self.assertAlmostEqual(out.roughness, 0.4, places=6)
 
     def image(self, name="picture", colour=(0.5, 0.25, 1.0, 0.4), srgb=True, width=4, height=2):
         image = bpy.data.images.new(name, width, height, alpha=True)

@@ -17,6 +17,11 @@ inline SurfacePoint random_surface(Rng& rng, float half, bool glossy) {
     p.shininess = std::pow(1000.0f, rng.next_float());
     p.specular =
         Rgb{rng.next_float(), rng.next_float(), rng.next_float()} * lobe_scale(rng.next_below(2) == 0, p.shininess);
+    if (rng.next_below(2) == 0) {
+      p.shininess = -std::pow(0.01f, rng.next_float());
+      p.specular = {rng.next_float(), rng.next_float(), rng.next_float()};
+      p.grazing = {rng.next_float(), rng.next_float(), rng.next_float()}, p.fade = rng.next_float();
+    }
     if (rng.next_below(4) == 0) p.diffuse = {};
   }
   return p;

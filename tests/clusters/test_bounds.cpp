@@ -50,6 +50,53 @@ TEST(Bounds, AMillionRandomPairsNeverPassTheBoundOfTheirCluster) {
   EXPECT_GT(zero_bounds, pairs / 20);
 }
 
+TEST(Bounds, OfGgxAreAboutAsNearAsThoseOfBlinnLobesOfItsWidth) {
+  for (const float alpha : {0.02f, 0.1f, 0.3f, 0.7f}) {
+    double ratio[2];
+    for (const int ggx : {0, 1}) {
+      double bound = 0, value = 0;
+      for (uint32_t trial = 0; trial < 2000; ++trial) {
+        Rng rng(trial, Stage::test, 21);
+        const std::vector<Vpl> lights = test::random_cluster(rng, VplKind::oriented, 6);
+        ShadePoints points;
+        for (size_t i = 0; i < kLanes; ++i) {
+          SurfacePoint p = test::random_surface(rng, 1.5f, false);
+          p.diffuse = {};
+          // Half of all lobes look at the lights: elsewhere they give next to nothing.
+          const Vec3f to = normalize(lights[0].position - p.position);
+          if (rng.next_below(2) == 0 && dot(to, p.normal) > 0) p.mirror = to;
+          if (ggx != 0) {
+            p.specular = {0.5f, 0.5f, 0.5f}, p.grazing = {1, 1, 1}, p.shininess = -alpha;
+          } else {
+            p.shininess = 0.5f / (alpha * alpha) - 0.5f;
+            p.specular = Rgb{0.5f, 0.5f, 0.5f} * lobe_scale(false, p.shininess);
+          }
+          points.push(p);
+        }
+        points.finish();
+        PointBlock block;
+        block.load(points, 0);
+        Progress progress;
+        const LightTree tree = LightTree::build(lights, {LightTree::Method::agglomerative, 4.0f, 1, trial}, progress);
+        const LightNode& root = tree.node(tree.roots()[0]);
+        float bounds[kLanes];
+        light_node_bounds(root, block, 0.04f, bounds);
+        for (size_t i = 0; i < kLanes; ++i) {
+          bound += std::log(1e-6 + bounds[i]);
+          float most = 0;
+          for (const Vpl& light : lights)
+            most = std::max(most, luminance(light_point(light, root.intensity, 0.04f, points.get(i))));
+          value += std::log(1e-6 + most);
+        }
+      }
+      ratio[ggx] = std::exp((bound - value) / (2000.0 * kLanes));
+    }
+    RecordProperty("alpha " + std::to_string(alpha),
+                   "Blinn " + std::to_string(ratio[0]) + ", GGX " + std::to_string(ratio[1]));
+    EXPECT_LT(ratio[1], 2.0 * ratio[0]) << alpha;
+  }
+}
+
 TEST(Bounds, DoNotDependOnTheScaleOfTheScene) {
   for (uint32_t trial = 0; trial < 200; ++trial) {
     Rng rng(trial, Stage::test, 7);

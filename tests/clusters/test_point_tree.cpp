@@ -39,10 +39,15 @@ TEST(PointTree, HoldsEveryPointOnceAndEveryLaneItsPoints) {
         for (int k = 0; k < 3; ++k) {
           ASSERT_LE(std::abs(p.position[k] - block.center[k][lane]), block.half[k][lane] * 1.000001f + 1e-6f);
           ASSERT_LE(p.diffuse[k], block.diffuse[k][lane]);
-          ASSERT_LE(p.specular[k], block.specular[k][lane]);
+          ASSERT_LE(p.specular[k], (p.ggx() ? block.schlick : block.specular)[k][lane]);
+          ASSERT_LE(p.grazing[k], p.ggx() ? block.grazing[k][lane] : 0.0f);
           normal_cosine += p.normal[k] * block.normal[k][lane];
         }
         ASSERT_GE(normal_cosine, block.normal_cos[lane] - 1e-5f);
+        ASSERT_GE(p.fade, block.fade[lane]);
+        if (!p.ggx()) continue;
+        ASSERT_LE(block.alpha2_low[lane], p.shininess * p.shininess);
+        ASSERT_GE(block.alpha2_high[lane], p.shininess * p.shininess);
       }
     };
     check(tree.leaves, 16);

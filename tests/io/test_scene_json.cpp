@@ -198,6 +198,42 @@ TEST(SceneJson, ATextureMaySayThatItEndsAndIsNotFiltered) {
   expect_in(error_of([&] { read_scene(file); }), {"mirror"});
 }
 
+TEST(SceneJson, GgxHasItsOwnParameters) {
+  const TemporaryFolder folder;
+  json scene = json::parse(kScene);
+  scene["materials"].push_back({{"name", "steel"}, {"model", "ggx"}, {"diffuse", {0.6, 0.6, 0.7}}, {"metallic", 1}});
+  scene["materials"].push_back({{"name", "pane"},
+                                {"model", "ggx"},
+                                {"roughness", 0},
+                                {"transmission", 1},
+                                {"ior", 1.33},
+                                {"specular", {0.5, 0.5, 0.5}}});
+  const SceneData data = read_scene(folder.write("scene.json", scene.dump()));
+  const auto find = [&](const std::string& name) {
+    for (const auto& m : data.materials)
+      if (m.name == name) return m.values;
+    return lumicut_material{};
+  };
+  const lumicut_material steel = find("steel"), pane = find("pane");
+  EXPECT_EQ(steel.flags, uint32_t{LUMICUT_GGX});
+  EXPECT_EQ(steel.metallic, 1.0f);
+  EXPECT_EQ(steel.roughness, 0.5f);
+  EXPECT_EQ(steel.specular[0], 1.0f) << "as the index of refraction has it";
+  EXPECT_EQ(pane.roughness, 0.0f);
+  EXPECT_EQ(pane.transmission, 1.0f);
+  EXPECT_EQ(pane.ior, 1.33f);
+  EXPECT_EQ(pane.specular[0], 0.5f);
+  const auto wrong = [&](const json& material) {
+    json other = json::parse(kScene);
+    other["materials"].push_back(material);
+    return error_of([&] { read_scene(folder.write("wrong.json", other.dump())); });
+  };
+  expect_in(wrong({{"name", "a"}, {"roughness", 0.5}}), {"roughness", "\"ggx\" alone"});
+  expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"shininess", 5}}), {"shininess", "not of the model \"ggx\""});
+  expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"roughness", 1.5}}), {"roughness", "1.5"});
+  expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"ior", 0}}), {"ior", "0"});
+}
+
 TEST(SceneJson, MaterialsOfAnObjCanBeChangedByName) {
   const TemporaryFolder folder;
   folder.write("m.mtl", "newmtl floor\nKd 0.2 0.2 0.2\nNs 5\n\nnewmtl wall\nKd 0.7 0.7 0.7\n");
@@ -295,7 +331,7 @@ TEST(SceneJson, WrongValuesAreNamedWithPathAndValue) {
   expect_in(at("/up", "x"), {"up", "\"x\"", "y, z"});
   expect_in(at("/materials/0/diffuse/2", 1.5), {"materials[0].diffuse[2]", "1.5"});
   expect_in(at("/materials/0/diffuse/2", -0.1), {"materials[0].diffuse[2]", "-0.1"});
-  expect_in(at("/materials/0/model", "ward"), {"materials[0].model", "ward", "blinn, phong"});
+  expect_in(at("/materials/0/model", "ward"), {"materials[0].model", "ward", "blinn, phong, ggx"});
   expect_in(at("/materials/0/diffuse_texture", "no.png"),
             {"no.png", "no such texture", "\"grey\"", "materials[0].diffuse_texture"});
   expect_in(at("/materials/1", {{"name", "grey"}}), {"materials[1].name", "already"});

@@ -139,6 +139,13 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
       {[](M& m) { m.opacity = 2; }, "lumicut_material[3].opacity: 2 is not in [0, 1]"},
       {[](M& m) { m.emission[0] = kInf; }, "lumicut_material[3].emission[0]: inf is not in [0, inf)"},
       {[](M& m) { m.emission_texture = -3; }, "lumicut_material[3].emission_texture: -3"},
+      {[](M& m) { m.normal_texture = -1; }, "lumicut_material[3].normal_texture: -1"},
+      {[](M& m) { m.normal_strength = 11; }, "lumicut_material[3].normal_strength: 11 is not in [0, 10]"},
+      {[](M& m) { m.roughness = 1.5f; }, "lumicut_material[3].roughness: 1.5 is not in [0, 1]"},
+      {[](M& m) { m.metallic = -1; }, "lumicut_material[3].metallic: -1 is not in [0, 1]"},
+      {[](M& m) { m.ior = 0.05f; }, "lumicut_material[3].ior: 0.05 is not in [0.1, 10]"},
+      {[](M& m) { m.transmission = kNan; }, "lumicut_material[3].transmission: nan is not in [0, 1]"},
+      {[](M& m) { m.flags = LUMICUT_PHONG | LUMICUT_GGX; }, "lumicut_material[3].flags: holds both"},
       {[](M& m) { m.flags = 64; }, "lumicut_material[3].flags: 64", LUMICUT_UNSUPPORTED},
   };
   for (const auto& w : wrongs) {

@@ -20,10 +20,27 @@ SurfacePoint point_of(const Rgb& kd, const Rgb& ks, float shininess, const Vec3f
   return p;
 }
 
+// A GGX surface as the scene makes it.
+SurfacePoint ggx_point(const Rgb& base, float roughness, float metallic, float ior, const Vec3f& to_viewer,
+                       const Vec3f& normal = normalize(Vec3f{0.2f, -0.3f, 0.9f})) {
+  Material m;
+  m.lobe = LobeModel::ggx;
+  m.diffuse = base, m.specular = {1, 1, 1};
+  m.roughness = roughness, m.metallic = metallic, m.ior = ior;
+  Scene scene(Scene::Config{});
+  scene.set_materials({m});
+  return scene.shade_point({}, normal, normal, {}, 0, to_viewer, 0);
+}
+
 std::vector<SurfacePoint> points() {
   const Vec3f steep = normalize(Vec3f{0.3f, 0.1f, 0.9f}), flat = normalize(Vec3f{0.9f, 0.3f, 0.2f});
-  return {point_of({0.5f, 0.4f, 0.3f}, {}, 0, steep), point_of({0.2f, 0.2f, 0.2f}, {0.6f, 0.5f, 0.4f}, 40, steep),
-          point_of({}, {0.8f, 0.8f, 0.8f}, 5, flat), point_of({0.1f, 0.1f, 0.1f}, {0.5f, 0.5f, 0.5f}, 300, flat)};
+  return {point_of({0.5f, 0.4f, 0.3f}, {}, 0, steep),
+          point_of({0.2f, 0.2f, 0.2f}, {0.6f, 0.5f, 0.4f}, 40, steep),
+          point_of({}, {0.8f, 0.8f, 0.8f}, 5, flat),
+          point_of({0.1f, 0.1f, 0.1f}, {0.5f, 0.5f, 0.5f}, 300, flat),
+          ggx_point({0.5f, 0.4f, 0.3f}, 0.6f, 0, 1.5f, steep),
+          ggx_point({0.9f, 0.7f, 0.3f}, 0.5f, 1, 1.5f, flat),
+          ggx_point({0.2f, 0.2f, 0.2f}, 1.0f, 0.5f, 2.0f, flat)};
 }
 
 // Pearson's statistic over 16 x 32 cells of the sphere, against the density integrated over each cell.
@@ -72,7 +89,7 @@ TEST(Bsdf, SamplesFollowTheirDensity) {
       ++cells;
     }
     // Five standard deviations of chi-squared with `cells` degrees of freedom.
-    EXPECT_LT(chi2, cells + 5 * std::sqrt(2.0 * cells)) << "shininess " << p.shininess;
+    EXPECT_LT(chi2, cells + 5 * std::sqrt(2.0 * cells)) << "shininess or −α " << p.shininess;
   }
 }
 
@@ -87,6 +104,74 @@ TEST(Bsdf, WeightIsReflectanceTimesCosineOverDensity) {
       const float scale = dot(p.normal, s.direction) / s.pdf;
       for (int k = 0; k < 3; ++k) EXPECT_NEAR(s.weight[k], f[k] * scale, 1e-4f * (1 + f[k] * scale));
     }
+}
+
+// Reflected share of light that comes evenly from everywhere, by steps over the hemisphere that are fine where the
+// lobe is.
+double albedo(const SurfacePoint& p, int channel) {
+  constexpr int kSamples = 20000;
+  const Bsdf bsdf(p);
+  double sum = 0;
+  for (int i = 0; i < kSamples; ++i) {
+    const auto u = static_cast<float>(std::fmod(0.5 + i * 0.7548776662466927, 1.0)),
+               v = static_cast<float>(std::fmod(0.5 + i * 0.5698402909980532, 1.0));
+    const BsdfSample s = bsdf.sample((static_cast<float>(i) + 0.5f) / kSamples, u, v);
+    if (s.pdf > 0) sum += s.weight[channel];
+  }
+  return sum / kSamples;
+}
+
+TEST(Bsdf, AWhiteFurnaceStaysWhiteAtMost) {
+  double least = 1, worst = 0;
+  for (const float metallic : {0.0f, 0.5f, 1.0f})
+    for (const float ior : {1.0f, 1.1f, 1.5f, 2.0f})
+      for (const float roughness : {0.1f, 0.2f, 0.32f, 0.45f, 0.55f, 0.7f, 0.85f, 1.0f})
+        for (const float cosine : {0.02f, 0.1f, 0.2f, 0.3f, 0.5f, 0.7f, 0.9f, 1.0f}) {
+          const Vec3f view{std::sqrt(1 - cosine * cosine), 0, cosine};
+          const SurfacePoint p = ggx_point({1, 1, 1}, roughness, metallic, ior, view, {0, 0, 1});
+          const double a = albedo(p, 1);
+          EXPECT_LE(a, 1.02) << "metallic " << metallic << " ior " << ior << " roughness " << roughness << " cosine "
+                             << cosine;
+          // Edge-on the fits give up light rather than gain any.
+          if (cosine >= 0.3f) {
+            EXPECT_GE(a, metallic > 0 ? 0.88 : 0.92)
+                << "metallic " << metallic << " ior " << ior << " roughness " << roughness << " cosine " << cosine;
+          }
+          least = std::min(least, a), worst = std::max(worst, a);
+        }
+  RecordProperty("least", std::to_string(least));
+  RecordProperty("most", std::to_string(worst));
+}
+
+TEST(Bsdf, WhiteOfEveryRoughnessReflectsAllButAFewPercentOfEvenLight) {
+  for (const float metallic : {0.0f, 1.0f})
+    for (const float roughness : {0.1f, 0.2f, 0.32f, 0.45f, 0.55f, 0.7f, 0.85f, 1.0f}) {
+      double sum = 0;
+      for (int i = 0; i < 32; ++i) {  // over the view's projected solid angle
+        const float cosine = std::sqrt((static_cast<float>(i) + 0.5f) / 32);
+        const SurfacePoint p =
+            ggx_point({1, 1, 1}, roughness, metallic, 1.5f, {std::sqrt(1 - cosine * cosine), 0, cosine}, {0, 0, 1});
+        sum += albedo(p, 1) / 32;
+      }
+      EXPECT_LE(sum, 1.005) << "metallic " << metallic << " roughness " << roughness;
+      EXPECT_GE(sum, metallic > 0 ? 0.94 : 0.975) << "metallic " << metallic << " roughness " << roughness;
+    }
+}
+
+TEST(Bsdf, GgxIsReciprocal) {
+  Rng rng(5, Stage::test);
+  for (int i = 0; i < 4000; ++i) {
+    const float roughness = 0.1f + 0.9f * rng.next_float(), metallic = rng.next_float(), ior = 1 + rng.next_float();
+    const Vec3f normal = test::random_direction(rng);
+    Vec3f a = test::random_direction(rng), b = test::random_direction(rng);
+    if (dot(a, normal) < 0) a = -a;
+    if (dot(b, normal) < 0) b = -b;
+    if (dot(a, normal) < 0.02f || dot(b, normal) < 0.02f) continue;
+    const Rgb base{rng.next_float(), rng.next_float(), rng.next_float()};
+    const Rgb there = reflectance(ggx_point(base, roughness, metallic, ior, a, normal), b),
+              back = reflectance(ggx_point(base, roughness, metallic, ior, b, normal), a);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(there[k], back[k], 2e-3f * there[k] + 1e-5f) << roughness;
+  }
 }
 
 TEST(Bsdf, ABlackSurfaceReflectsNothing) {

@@ -147,4 +147,33 @@ TEST(Scene, EnvironmentMapFollowsItsFormula) {
   EXPECT_EQ(at(-3.0f), 4.0f);
 }
 
+TEST(Scene, NormalMapsTurnTheShadingNormalAlongUAndV) {
+  const float toward_u[3] = {0.5f + 0.5f * 0.6f, 0.5f, 0.5f + 0.5f * 0.8f};
+  for (const int turned : {0, 1, 2}) {
+    Scene scene(Scene::Config{});
+    scene.set_textures({Texture(1, 1, 3, Texture::Format::float32, {}, toward_u)});
+    Material m = test::diffuse(0.5f, 0.5f, 0.5f);
+    m.normal_texture = 0;
+    if (turned == 2) m.normal_strength = 0.5f;
+    scene.set_materials({m});
+    Mesh mesh;
+    test::add_quad(mesh, {0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, 0);
+    // u along x, or along -y.
+    mesh.uvs = turned == 1 ? std::vector<Vec2f>{{1, 0}, {1, 1}, {0, 1}, {0, 0}}
+                           : std::vector<Vec2f>{{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    scene.add_mesh(mesh);
+    Progress progress;
+    scene.commit(progress);
+    std::vector<RayHit> rays(1);
+    rays[0].ray.org = {0.6f, 0.3f, 1}, rays[0].ray.dir = {0, 0, -1};
+    scene.accel().intersect(rays);
+    const SurfaceHit hit = scene.surface(rays[0]);
+    const Vec3f expected = turned == 0   ? Vec3f{0.6f, 0, 0.8f}
+                           : turned == 1 ? Vec3f{0, -0.6f, 0.8f}
+                                         : normalize(Vec3f{0.3f, 0, 0.9f});
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(hit.normal[k], expected[k], 1e-5f) << turned;
+    EXPECT_EQ(hit.geometric_normal, (Vec3f{0, 0, 1}));
+  }
+}
+
 }  // namespace lumicut

@@ -46,13 +46,17 @@ inline Material diffuse(float r, float g, float b) {
   return m;
 }
 
-// A room of side 2 around the origin (times `scale`) with two blocks, a glossy floor, an upward area lamp and a spot.
+// A room of side 2 around the origin (times `scale`) with two blocks, a glossy floor, a coated wall, an upward area
+// lamp and a spot.
 inline std::unique_ptr<Scene> make_room(float scale = 1.0f, const std::string& accel = "embree") {
   auto scene = std::make_unique<Scene>(Scene::Config{accel, true});
   Material glossy = diffuse(0.3f, 0.3f, 0.3f);
   glossy.specular = {0.4f, 0.4f, 0.4f};
   glossy.shininess = 60.0f;
-  scene->set_materials({diffuse(0.7f, 0.7f, 0.7f), diffuse(0.7f, 0.15f, 0.1f), diffuse(0.1f, 0.6f, 0.2f), glossy});
+  Material coated = diffuse(0.7f, 0.15f, 0.1f);
+  coated.lobe = LobeModel::ggx;
+  coated.specular = {1, 1, 1}, coated.roughness = 0.5f, coated.metallic = 0.3f;
+  scene->set_materials({diffuse(0.7f, 0.7f, 0.7f), coated, diffuse(0.1f, 0.6f, 0.2f), glossy});
   Mesh mesh;
   add_box(mesh, Vec3f{-1, -1, -1} * scale, Vec3f{1, 1, 1} * scale, 0, true);
   mesh.triangle_materials[8] = mesh.triangle_materials[9] = 1;

@@ -56,6 +56,78 @@ TEST(TraceVpls, DepthLimitCutsTheSeries) {
   EXPECT_EQ(none.lights.size(), 1u) << "the lamp itself";
 }
 
+// A floor of albedo 1/2 below a slab of `material`, and a spot that shines straight up or down through the slab's
+// middle: the flux that leaves the floor over the flux of the lamp.
+double flux_from_floor(const Material& material, bool from_above) {
+  Scene scene(Scene::Config{});
+  scene.set_materials({test::diffuse(0.5f, 0.5f, 0.5f), material});
+  Mesh mesh;
+  test::add_quad(mesh, {-9, -9, 0}, {9, -9, 0}, {9, 9, 0}, {-9, 9, 0}, 0);
+  test::add_box(mesh, {-8, -8, 2}, {8, 8, 2.2f}, 1, false);
+  scene.add_mesh(mesh);
+  Light l;
+  l.type = LightType::spot;
+  l.position = {0, 0, from_above ? 3.0f : 1.0f};
+  l.direction = {0, 0, from_above ? -1.0f : 1.0f};
+  l.cos_outer = 0.9f;
+  l.value = {1, 1, 1};
+  scene.set_lights({l});
+  Progress progress;
+  scene.commit(progress);
+  const VplSet set = trace_vpls(scene, {.count = 40000, .max_depth = 30}, progress);
+  // The floor's first light alone: what comes back to it is small.
+  double flux = 0;
+  for (const Vpl& v : set.lights)
+    if (v.kind == VplKind::oriented && v.position.z < 1) flux += std::numbers::pi * v.intensity.x;
+  return flux / (2 * std::numbers::pi * 0.1);
+}
+
+TEST(TraceVpls, MirrorsAndGlassHandLightOn) {
+  Material m;
+  m.lobe = LobeModel::ggx;
+  m.specular = {1, 1, 1};
+  m.roughness = 0, m.diffuse = {0.4f, 0.4f, 0.4f};
+  m.metallic = 1;
+  // Floor ½ · mirror 0.4, once more by ½ · 0.4 · (share that returns), and so on: between 0.2 and 0.25.
+  const double mirror = flux_from_floor(m, false);
+  EXPECT_GT(mirror, 0.2);
+  EXPECT_LT(mirror, 0.255);
+  EXPECT_EQ(flux_from_floor(m, true), 0.0) << "a mirror lets nothing through";
+  m.metallic = 0, m.transmission = 1, m.diffuse = {1, 1, 1};
+  // A slab passes (1 − R)/(1 + R) with R = 0.04, 0.923; the floor gives half; a tenth or less of it returns.
+  const double glass = flux_from_floor(m, true);
+  EXPECT_GT(glass, 0.44);
+  EXPECT_LT(glass, 0.5);
+}
+
+TEST(TraceVpls, ClosedBoxOfGgxKeepsAlmostAllOfItsAlbedo) {
+  // Every wall reflects 97 to 100 % of what is left when its base takes the rest: flux of all VPLs at albedo near 1/2.
+  auto scene = std::make_unique<Scene>(Scene::Config{});
+  Material m = test::diffuse(0.5f, 0.5f, 0.5f);
+  m.lobe = LobeModel::ggx, m.specular = {1, 1, 1}, m.roughness = 0.4f;
+  scene->set_materials({m});
+  Mesh mesh;
+  test::add_box(mesh, {-1, -1, -1}, {1, 1, 1}, 0, true);
+  scene->add_mesh(mesh);
+  Light l;
+  l.value = {1, 1, 1};
+  scene->set_lights({l});
+  Progress progress;
+  scene->commit(progress);
+  const VplSet set = trace_vpls(*scene, {.count = 100000, .max_depth = 200}, progress);
+  double flux = 0;
+  for (const Vpl& v : set.lights)
+    if (v.kind == VplKind::oriented) flux += std::numbers::pi * v.intensity.x;
+  // Of light that meets a wall the coat reflects s, 0.05 to 0.09, and the base 0.5 (1 − s − at most 0.03); bases give
+  // Φ d/(1 − s − d).
+  const auto series = [](double s, double lost) {
+    const double d = 0.5 * (1 - s - lost);
+    return 4 * std::numbers::pi * d / (1 - s - d);
+  };
+  EXPECT_GT(flux, series(0.05, 0.03));
+  EXPECT_LT(flux, series(0.09, -0.005));
+}
+
 TEST(TraceVpls, SameLightsOnOneAndFourThreads) {
   const auto scene = test::make_room();
   std::vector<Vpl> first;

@@ -160,15 +160,23 @@ enum { LUMICUT_SRGB = 1, LUMICUT_CLAMP = 2, LUMICUT_NEAREST = 4 };
 
 typedef struct lumicut_material {
   uint32_t struct_size;
-  uint32_t flags;          /* LUMICUT_EMIT_BOTH_SIDES; LUMICUT_PHONG: the specular lobe is Phong's, else Blinn's */
+  uint32_t flags;          /* LUMICUT_EMIT_BOTH_SIDES; LUMICUT_PHONG: the specular lobe is Phong's, LUMICUT_GGX: GGX's, else Blinn's */
   float diffuse[3];        /* kd, 0..1 */
   float shininess;         /* n, the lobe's exponent, >= 0 */
   float specular[3];       /* ks, 0..1: Blinn ks (n+2)/2pi cos^n(beta); Phong ks/2pi cos^n(beta); see docs/scene_format.md */
   float opacity;           /* 0: not given, taken as 1; below 0.5 a hole where there is no texture */
   float emission[3];       /* radiance, on the side the geometric normal points to */
   int32_t diffuse_texture, specular_texture, opacity_texture, emission_texture; /* 1 + index into the textures; 0: none. Factors multiply */
+  /* LUMICUT_GGX alone: diffuse is the base colour, specular multiplies the dielectric's reflectance ((ior-1)/(ior+1))^2 */
+  float roughness;         /* 0..1; the distribution's alpha is its square */
+  float metallic;          /* 0..1 */
+  float ior;               /* 0.1..10; 0: not given, taken as 1.5 */
+  float transmission;      /* 0..1: share of glass in what is not metal */
+  /* Any model */
+  int32_t normal_texture;  /* 1 + index; 0: none. Linear; (r, g, b) is (1 + n)/2 of the normal along u, v and out of the surface */
+  float normal_strength;   /* 0..10; 0: not given, taken as 1 */
 } lumicut_material;
-enum { LUMICUT_EMIT_BOTH_SIDES = 1, LUMICUT_PHONG = 2 };
+enum { LUMICUT_EMIT_BOTH_SIDES = 1, LUMICUT_PHONG = 2, LUMICUT_GGX = 4 };
 
 typedef struct lumicut_mesh {
   uint32_t struct_size;

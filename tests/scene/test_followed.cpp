@@ -1,0 +1,150 @@
+#include <gtest/gtest.h>
+
+#include "scene/followed.h"
+#include "tests/support/test_scenes.h"
+
+namespace lumicut {
+namespace {
+
+Material ggx(const Rgb& base, float roughness) {
+  Material m;
+  m.lobe = LobeModel::ggx;
+  m.diffuse = base, m.specular = {1, 1, 1};
+  m.roughness = roughness;
+  return m;
+}
+
+Material glass(float roughness, float ior = 1.5f, const Rgb& base = {1, 1, 1}) {
+  Material m = ggx(base, roughness);
+  m.transmission = 1, m.ior = ior;
+  return m;
+}
+
+struct OneSurface {
+  explicit OneSurface(const Material& m) {
+    scene.set_materials({m});
+    hit.position = {1, 2, 3}, hit.geometric_normal = hit.normal = {0, 0, 1};
+  }
+  std::optional<Followed> follow(const Vec3f& to_viewer, float choice, float u = 0.3f, float v = 0.6f) const {
+    return lumicut::follow(scene, hit, to_viewer, choice, u, v);
+  }
+  Scene scene{Scene::Config{}};
+  SurfaceHit hit;
+};
+
+Vec3f at(float cosine, float azimuth = 0.7f) {
+  const float s = std::sqrt(1 - cosine * cosine);
+  return {s * std::cos(azimuth), s * std::sin(azimuth), cosine};
+}
+
+// Mean weight of what is reflected and what is transmitted.
+std::pair<double, double> energy(const Material& m, const Vec3f& to_viewer) {
+  const OneSurface surface(m);
+  constexpr int kSamples = 20000;
+  Rng rng(2, Stage::test);
+  double reflected = 0, transmitted = 0;
+  for (int i = 0; i < kSamples; ++i) {
+    const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float();
+    if (const auto f = surface.follow(to_viewer, choice, u, v))
+      (f->transmitted ? transmitted : reflected) += f->weight.y / kSamples;
+  }
+  return {reflected, transmitted};
+}
+
+}  // namespace
+
+TEST(Followed, AMirrorReflectsExactly) {
+  Material m = ggx({0.9f, 0.6f, 0.3f}, 0);
+  m.metallic = 1;
+  const OneSurface mirror(m);
+  const Vec3f to_viewer = at(0.6f);
+  const auto f = mirror.follow(to_viewer, 0.5f);
+  ASSERT_TRUE(f);
+  EXPECT_FALSE(f->transmitted);
+  const Vec3f expected{-to_viewer.x, -to_viewer.y, to_viewer.z};
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(f->direction[k], expected[k], 1e-6f);
+    const float f0 = m.diffuse[k];
+    EXPECT_NEAR(f->weight[k], f0 + (1 - f0) * std::pow(0.4f, 5.0f), 1e-5f);
+  }
+  EXPECT_GT(f->origin.z, 3.0f) << "off the surface, on the viewer's side";
+  const SurfacePoint p = mirror.scene.shade_point(mirror.hit, to_viewer, 0);
+  EXPECT_EQ(p.specular, Rgb{}) << "what is followed is not shaded as well";
+  EXPECT_EQ(max_component(p.diffuse), 0.0f);
+}
+
+TEST(Followed, NothingWhereLightsCanShade) {
+  EXPECT_FALSE(OneSurface(ggx({0.5f, 0.5f, 0.5f}, 0.3f)).follow(at(0.6f), 0.5f));
+  EXPECT_FALSE(OneSurface(test::diffuse(0.5f, 0.5f, 0.5f)).follow(at(0.6f), 0.5f));
+}
+
+TEST(Followed, GlassRefractsBySnellsLawFromBothSides) {
+  const OneSurface surface(glass(0, 1.5f));
+  for (const float cosine : {0.2f, 0.5f, 0.8f, 0.99f})
+    for (const bool inside : {false, true}) {
+      const Vec3f to_viewer = inside ? -at(cosine) : at(cosine);
+      const auto f = surface.follow(to_viewer, 0.9999f);
+      const float sine = std::sqrt(1 - cosine * cosine), expected = inside ? sine * 1.5f : sine / 1.5f;
+      ASSERT_TRUE(f);
+      if (expected >= 1) {
+        EXPECT_FALSE(f->transmitted) << "total reflection";
+        EXPECT_NEAR(f->weight.x, 1.0f, 1e-5f);
+        continue;
+      }
+      ASSERT_TRUE(f->transmitted);
+      EXPECT_NEAR(std::hypot(f->direction.x, f->direction.y), expected, 1e-5f);
+      EXPECT_LT(f->direction.z * to_viewer.z, 0.0f) << "goes on to the other side";
+      EXPECT_LT((f->origin.z - 3.0f) * to_viewer.z, 0.0f);
+      EXPECT_NEAR(cross(f->direction, to_viewer).z, 0.0f, 1e-5f) << "in the plane of incidence";
+    }
+}
+
+TEST(Followed, GlassReflectsFresnelsShareAndPassesTheRest) {
+  const auto [straight, through] = energy(glass(0, 1.5f), at(1.0f));
+  EXPECT_NEAR(straight, 0.04, 0.005);
+  EXPECT_NEAR(through, 0.96, 0.005);
+  float refracted = 0;
+  const float edge = fresnel_reflectance(0.2f, 1.5f, refracted);
+  const auto [slanting, rest] = energy(glass(0, 1.5f), at(0.2f));
+  EXPECT_NEAR(slanting, edge, 0.01);
+  EXPECT_NEAR(slanting + rest, 1.0, 1e-4);
+}
+
+TEST(Followed, TwoBordersColourLikeTheBase) {
+  const OneSurface surface(glass(0, 1.5f, {0.25f, 0.81f, 1.0f}));
+  const auto f = surface.follow(at(1.0f), 0.9999f);
+  ASSERT_TRUE(f && f->transmitted);
+  EXPECT_NEAR(f->weight.x / f->weight.z, 0.5f, 1e-5f);
+  EXPECT_NEAR(f->weight.y / f->weight.z, 0.9f, 1e-5f);
+}
+
+TEST(Followed, RoughGlassAndMirrorsLoseLittleAndGainNothing) {
+  for (const float roughness : {0.05f, 0.09f, 0.3f, 0.5f})
+    for (const float cosine : {0.1f, 0.4f, 0.7f, 1.0f})
+      for (const float sign : {1.0f, -1.0f}) {
+        const auto [r, t] = energy(glass(roughness), at(cosine) * sign);
+        EXPECT_LE(r + t, 1.001);
+        if (cosine > 0.3f) {
+          EXPECT_GE(r + t, roughness < 0.4f ? 0.95 : 0.8) << roughness << " " << cosine;
+        }
+      }
+  Material m = ggx({1, 1, 1}, 0.09f);
+  m.metallic = 1;
+  const auto [r, t] = energy(m, at(0.5f));
+  EXPECT_NEAR(r, 1.0, 0.01);
+  EXPECT_EQ(t, 0.0);
+}
+
+TEST(Followed, ASmoothCoatAndItsBaseTogetherKeepTheLight) {
+  const OneSurface surface(ggx({1, 1, 1}, 0.0f));
+  for (const float cosine : {0.1f, 0.3f, 0.6f, 1.0f}) {
+    const auto f = surface.follow(at(cosine), 0.5f);
+    ASSERT_TRUE(f);
+    const SurfacePoint p = surface.scene.shade_point(surface.hit, at(cosine), 0);
+    const float base = p.diffuse.x * std::numbers::pi_v<float> * mean_of_fading(p.fade);
+    EXPECT_LE(base + f->weight.x, 1.001f) << cosine;
+    EXPECT_GE(base + f->weight.x, 0.92f) << cosine;
+  }
+}
+
+}  // namespace lumicut
