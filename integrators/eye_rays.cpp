@@ -39,6 +39,7 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
   std::vector<Rng> rngs;
   std::vector<float> pdfs;
   std::vector<Ray> shadows;
+  std::vector<ChainRay> chains;
   for (size_t i = 0; i < points.size(); ++i) {
     const SurfacePoint point = points.get(i);
     Rng rng = rng_of(point, level);
@@ -77,6 +78,8 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
       if (max_component(emitted) > 0.0f)
         hits.add(emitted * weights[i] * lost, pixels[i], scene_.meshes()[surface.mesh].group);
     }
+    // Mirrors and glass show it what is behind them: no virtual light shines by way of those.
+    if (auto ray = start_chain(scene_, surface, to_viewer, weights[i], pixels[i], rngs[i])) chains.push_back(*ray);
     SurfacePoint point = scene_.shade_point(surface, to_viewer, pixels[i]);
     point.diffuse = point.diffuse * lost;
     // Chance decides by what the surface still shows, so that few points cost a whole sum of lights.
@@ -85,9 +88,9 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
     if (!(rngs[i].next_float() < survive)) continue;
     const Rgb factor = weights[i] / survive;
     point.attenuate(factor);
-    hits.points.push(point);
+    hits.found.push_back(point);
   }
-  hits.points.finish();
+  follow_chains(scene_, lamp_surfaces_, std::move(chains), hits, counters);
   return hits;
 }
 

@@ -6,21 +6,12 @@
 #include <memory>
 
 #include "core/stats.h"
+#include "integrators/followed_chain.h"
 #include "integrators/near_lamps.h"
 #include "scene/scene.h"
 #include "vpl/lamp_surfaces.h"
 
 namespace lumicut {
-
-// Points that rays found, with what they show already multiplied in: their radiance adds to their pixels.
-struct EyeHits {
-  ShadePoints points;
-  std::vector<Rgb> light;              // emitted towards the ray
-  std::vector<uint32_t> pixel, group;  // of each entry of `light`
-  void add(const Rgb& radiance, uint32_t at, uint32_t of_group) {
-    light.push_back(radiance), pixel.push_back(at), group.push_back(of_group);
-  }
-};
 
 class EyeRays {
  public:

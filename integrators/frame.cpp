@@ -40,8 +40,10 @@ struct PixelSums {
 
 class Batch {
  public:
-  Batch(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options)
-      : scene_(scene), methods_(methods), options_(options) {}
+  // `lamps`: where anything of the scene is followed.
+  Batch(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options,
+        const LampSurfaces* lamps)
+      : scene_(scene), methods_(methods), options_(options), lamps_(lamps) {}
 
   void add_tile(const Rect& tile) {
     tiles_.push_back(tile);
@@ -56,11 +58,12 @@ class Batch {
   }
 
   // Camera rays → points.
-  void collect() {
+  void collect(ShadeContext context) {
     const size_t samples = options_.samples;
     sums_.resize(pixels_.size());
     std::vector<SurfacePoint> found(pixels_.size() * samples);
     std::vector<uint8_t> hit(found.size(), 0);
+    std::vector<std::optional<ChainRay>> chain(lamps_ != nullptr ? found.size() : 0);
     parallel_chunks(pixels_.size(), std::max<size_t>(1, 1024 / samples), [&](size_t begin, size_t end) {
       std::vector<RayHit> rays((end - begin) * samples);
       std::vector<float> cosines(rays.size());
@@ -69,13 +72,22 @@ class Batch {
       if (!scene_.bounds().empty()) scene_.accel().intersect(rays);
       for (size_t i = 0; i < rays.size(); ++i) {
         const size_t p = begin + i / samples;
-        hit[begin * samples + i] = first_hit(rays[i], p, cosines[i], found[begin * samples + i]);
+        const size_t at = begin * samples + i;
+        hit[at] = first_hit(rays[i], p, cosines[i], found[at]);
+        if (lamps_ != nullptr && hit[at] != 0) chain[at] = mirrored(rays[i], p, i % samples);
       }
     });
     points_.reserve(found.size());
     for (size_t i = 0; i < found.size(); ++i)
       if (hit[i] != 0) points_.push(found[i]);
     points_.finish();
+    std::vector<ChainRay> rays;
+    for (const auto& ray : chain)
+      if (ray) rays.push_back(*ray);
+    if (rays.empty()) return;
+    Counters counters;
+    follow_chains(scene_, *lamps_, std::move(rays), seen_, counters);
+    context.stats.add(counters);
   }
 
   // The points of the camera, and those that rays from them find.
@@ -83,13 +95,16 @@ class Batch {
     light_.assign(methods_.size(), std::vector<Rgb>(pixels_.size()));
     counts_.assign(pixels_.size(), {});
     shade_levels(points_, eye_rays, light_, context);
+    for (size_t i = 0; i < seen_.light.size(); ++i) light_[slot(seen_.group[i])][seen_.pixel[i]] += seen_.light[i];
+    if (!seen_.found.empty()) shade_levels(seen_.points(), eye_rays, light_, context);
     if (!options_.illuminance) return;
     // White Lambert surfaces show the irradiance over π.
     ShadePoints white;
     white.reserve(points_.size());
     for (size_t i = 0; i < points_.size(); ++i) {
       SurfacePoint point = points_.get(i);
-      point.diffuse = Rgb{1, 1, 1} * std::numbers::inv_pi_v<float>, point.specular = {}, point.shininess = 0.0f;
+      point.diffuse = Rgb{1, 1, 1} * std::numbers::inv_pi_v<float>, point.specular = point.grazing = {};
+      point.shininess = point.fade = 0.0f;
       white.push(point);
     }
     white.finish();
@@ -139,16 +154,15 @@ class Batch {
                     ShadeContext context) {
     add_light(first, light, context);
     if (eye_rays == nullptr) return;
-    EyeHits hits;
-    const ShadePoints* points = &first;
-    for (uint32_t level = 1; level <= kMaxLevels && points->size() > 0; ++level) {
+    ShadePoints points = first;
+    for (uint32_t level = 1; level <= kMaxLevels && points.size() > 0; ++level) {
       context.progress.check();
       Counters counters;
-      hits = eye_rays->trace(*points, level, counters);
+      const EyeHits hits = eye_rays->trace(points, level, counters);
       context.stats.add(counters);
       for (size_t i = 0; i < hits.light.size(); ++i) light[slot(hits.group[i])][hits.pixel[i]] += hits.light[i];
-      add_light(hits.points, light, context);
-      points = &hits.points;
+      points = hits.points();
+      add_light(points, light, context);
     }
   }
 
@@ -222,16 +236,27 @@ class Batch {
     return true;
   }
 
+  // What a mirror or glass there goes on to show.
+  std::optional<ChainRay> mirrored(const RayHit& ray, size_t p, size_t sample) const {
+    const SurfaceHit surface = scene_.surface(ray);
+    if (!scene_.materials()[surface.material].followed()) return {};
+    const auto [x, y] = pixels_[p];
+    return start_chain(scene_, surface, -ray.ray.dir, {1, 1, 1}, static_cast<uint32_t>(p),
+                       Rng(hash64(options_.seed, sample), Stage::eye_ray, x, y));
+  }
+
   struct Pixel {
     uint32_t x, y;
   };
   const Scene& scene_;
   const std::span<const GroupMethod> methods_;
   const FrameOptions& options_;
+  const LampSurfaces* const lamps_;
   std::vector<Rect> tiles_;
   std::vector<Pixel> pixels_;
   std::vector<PixelSums> sums_;
   ShadePoints points_;
+  EyeHits seen_;                         // by way of mirrors and glass
   std::vector<std::vector<Rgb>> light_;  // of each method: reflected, summed over a pixel's samples
   std::vector<float> illuminance_;       // summed over a pixel's samples
   std::vector<Vec3f> counts_;            // clusters, rays, bounds
@@ -284,6 +309,9 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
     batches.emplace_back(first, last);
     first = last;
   }
+  std::optional<LampSurfaces> lamps;
+  if (std::any_of(scene.materials().begin(), scene.materials().end(), [](const Material& m) { return m.followed(); }))
+    lamps.emplace(scene);
   std::optional<EyeRays> eye_rays;
   if (options.compensate > 0.0f) eye_rays.emplace(scene, options.compensate, options.seed);
   context.progress.begin("render", size_t{options.crop.width()} * options.crop.height());
@@ -292,9 +320,9 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
       [&](const tbb::blocked_range<size_t>& range) {
         for (size_t b = range.begin(); b < range.end(); ++b) {
           context.progress.check();
-          Batch batch(scene, methods, options);
+          Batch batch(scene, methods, options, lamps ? &*lamps : nullptr);
           for (size_t t = batches[b].first; t < batches[b].second; ++t) batch.add_tile(tiles[t]);
-          batch.collect();
+          batch.collect(context);
           batch.shade(eye_rays ? &*eye_rays : nullptr, context);
           context.progress.check();
           batch.write(film);

@@ -7,6 +7,7 @@
 #include "core/parallel.h"
 #include "integrators/integrator.h"
 #include "scene/bsdf.h"
+#include "scene/followed.h"
 #include "vpl/emitters.h"
 #include "vpl/lamp_surfaces.h"
 
@@ -65,6 +66,8 @@ class PathTracer final : public Integrator {
     Vec3f direction{};
     Rgb weight{};
     float pdf = 0.0f;
+    bool followed = false;  // by way of a mirror or glass, from `origin`: nothing else finds what it finds
+    Vec3f origin{};
   };
   struct Shadow {
     Rgb light;
@@ -91,6 +94,13 @@ class PathTracer final : public Integrator {
       size_t alive = 0;
       for (size_t i = 0; i < paths.size(); ++i) {
         Path path = paths[i];
+        if (path.followed) {
+          RayHit ray;
+          ray.ray.org = path.origin, ray.ray.dir = path.direction;
+          rays.push_back(ray);
+          paths[alive++] = path;
+          continue;
+        }
         sample_lights(path, shadow_rays, shadows);
         const float choice = path.rng.next_float(), u = path.rng.next_float(), v = path.rng.next_float();
         const BsdfSample s = Bsdf(path.point).sample(choice, u, v);
@@ -164,33 +174,55 @@ class PathTracer final : public Integrator {
     if (!lamps_->empty())
       lamps_->for_each_hit(hit.ray.org, path.direction, hit.ray.tfar, [&](const LampSurfaces::Hit& lamp) {
         const double density = emitters_->lamp_density(lamp.lamp) * double{lamp.t} * lamp.t / lamp.cosine;
-        sum += path.weight * lamp.radiance * mis_weight(path.pdf, density);
+        sum += path.weight * lamp.radiance * (path.followed ? 1.0f : mis_weight(path.pdf, density));
       });
     if (hit.hit.geom == kNoId) {
       const Rgb light = scene_->environment_radiance(path.direction);
       if (max_component(light) > 0.0f)
-        sum += path.weight * light * mis_weight(path.pdf, emitters_->environment_density(path.direction));
+        sum += path.weight * light *
+               (path.followed ? 1.0f : mis_weight(path.pdf, emitters_->environment_density(path.direction)));
       return false;
     }
     // A ray that meets its own surface at once left it below the horizon of the triangle.
-    if (hit.ray.tfar < 4.0f * scene_->epsilon()) return false;
+    if (!path.followed && hit.ray.tfar < 4.0f * scene_->epsilon()) return false;
     const SurfaceHit surface = scene_->surface(hit);
     const Vec3f to_viewer = -path.direction;
     const Rgb emitted = scene_->emitted(surface, to_viewer);
     if (max_component(emitted) > 0.0f) {
       const double cosine = std::max(1e-9f, std::abs(dot(surface.geometric_normal, to_viewer)));
       const double density = emitters_->mesh_density(surface) * double{surface.t} * surface.t / cosine;
-      sum += path.weight * emitted * mis_weight(path.pdf, density);
+      sum += path.weight * emitted * (path.followed ? 1.0f : mis_weight(path.pdf, density));
     }
     if (depth >= max_depth_) return false;
     path.point = scene_->shade_point(surface, to_viewer, path.point.pixel);
     Rgb factor = path.weight;
-    if (depth >= kSureBounces) {
-      const float survive = std::min(0.95f, max_component(Bsdf(path.point).albedo() * factor));
-      if (!(path.rng.next_float() < survive)) return false;
-      factor = factor / survive;
+    path.followed = false;
+    if (scene_->materials()[surface.material].followed()) {
+      const float choice = path.rng.next_float(), u = path.rng.next_float(), v = path.rng.next_float();
+      const float either = path.rng.next_float();
+      const auto f = lumicut::follow(*scene_, surface, to_viewer, choice, u, v);
+      // Half of the paths each way, where there are two.
+      const float share = Bsdf(path.point).black() ? 1.0f : 0.5f;
+      if (either < share) {
+        if (!f) return false;
+        path.followed = true;
+        path.origin = f->origin, path.direction = f->direction;
+        path.weight = factor * f->weight / share;
+        return survives(path, depth, path.weight, path.weight);
+      }
+      factor = factor / (1.0f - share);
     }
+    if (!survives(path, depth, Bsdf(path.point).albedo() * factor, factor)) return false;
     path.point.attenuate(factor);
+    return true;
+  }
+
+  // Chance ends paths that carry little; `factor` of the others grows.
+  static bool survives(Path& path, uint32_t depth, const Rgb& carried, Rgb& factor) {
+    if (depth < kSureBounces) return true;
+    const float survive = std::min(0.95f, max_component(carried));
+    if (!(path.rng.next_float() < survive)) return false;
+    factor = factor / survive;
     return true;
   }
 

@@ -115,6 +115,51 @@ TEST(PathTracer, AnEmissiveMeshGivesWhatARectangleLampGives) {
   for (size_t i = 8; i < 16; ++i) EXPECT_NEAR(ra[i] / rb[i], 1.0, 0.03) << i;  // about 1 % of noise each
 }
 
+// A mirror on one wall, a rough metal block, a glass block: light by way of all of them.
+std::unique_ptr<Scene> shiny_room() {
+  auto scene = std::make_unique<Scene>(Scene::Config{"embree", true});
+  Material mirror, metal, glass;
+  mirror.lobe = metal.lobe = glass.lobe = LobeModel::ggx;
+  mirror.diffuse = {0.9f, 0.9f, 0.9f}, mirror.metallic = 1.0f, mirror.roughness = 0.0f;
+  metal.diffuse = {0.8f, 0.6f, 0.3f}, metal.metallic = 1.0f, metal.roughness = 0.5f;
+  glass.diffuse = {0.9f, 1.0f, 0.9f}, glass.transmission = 1.0f, glass.roughness = 0.0f, glass.ior = 1.5f;
+  scene->set_materials({test::diffuse(0.6f, 0.6f, 0.6f), mirror, metal, glass});
+  Mesh mesh;
+  test::add_box(mesh, {-1, -1, -1}, {1, 1, 1}, 0, true);
+  mesh.triangle_materials[8] = mesh.triangle_materials[9] = 1;
+  test::add_box(mesh, {-0.6f, 0.1f, -1.0f}, {-0.1f, 0.6f, -0.3f}, 2, false);
+  test::add_box(mesh, {0.2f, -0.3f, -0.95f}, {0.6f, 0.2f, -0.5f}, 3, false);
+  scene->add_mesh(std::move(mesh));
+  Light lamp;
+  lamp.type = LightType::rectangle;
+  lamp.position = {0, 0, 0.9f};
+  lamp.u = {0.8f, 0, 0}, lamp.v = {0, -0.8f, 0};  // shines down
+  lamp.value = {5, 5, 5};
+  scene->set_lights({lamp});
+  scene->set_camera(inside_looking_along_y());
+  Progress progress;
+  scene->commit(progress);
+  return scene;
+}
+
+TEST(Compensation, MirrorsMetalAndGlassShowWhatThePathTracerShows) {
+  const auto scene = shiny_room();
+  const auto truth = test::render(*scene, "path_tracer", {}, {{"samples", "48"}}, 32, 24, 64).radiance;
+  constexpr int kPasses = 48;
+  const float clamp = 0.05f * scene->radius();
+  std::vector<Rgb> mean(truth.size());
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const auto image =
+        test::render(*scene, "lightcuts", test::lights_of(*scene, 1000, 50 + pass), {}, 32, 24, 8, 0, clamp, 50 + pass)
+            .radiance;
+    for (size_t i = 0; i < mean.size(); ++i) mean[i] += image[i] / float{kPasses};
+  }
+  EXPECT_NEAR(mean_of(mean) / mean_of(truth), 1.0, 0.015);
+  const auto found = region_means(mean, 32, 24, 3), expected = region_means(truth, 32, 24, 3);
+  for (size_t i = 0; i < found.size(); ++i)
+    EXPECT_NEAR(found[i], expected[i], 0.03 * mean_of(truth)) << "part " << i;  // caustics are noise in both: about 1 %
+}
+
 // What the clamp takes away comes back: in the mean over many sets of lights the image is the path tracer's.
 TEST(Compensation, VirtualLightsMeanThePathTracersImage) {
   const auto scene = test::make_room();
@@ -134,7 +179,7 @@ TEST(Compensation, VirtualLightsMeanThePathTracersImage) {
   EXPECT_NEAR(mean_of(mean) / mean_of(truth), 1.0, 0.01);
   const auto found = region_means(mean, 32, 24, 4), expected = region_means(truth, 32, 24, 4);
   for (size_t i = 0; i < found.size(); ++i)
-    EXPECT_NEAR(found[i], expected[i], 0.02 * mean_of(truth)) << "part " << i;  // noise of both: about half a percent
+    EXPECT_NEAR(found[i], expected[i], 0.025 * mean_of(truth)) << "part " << i;  // noise of both: up to 0.8 %
 }
 
 }  // namespace

@@ -1,0 +1,57 @@
+#include "integrators/followed_chain.h"
+
+#include "scene/bsdf.h"
+
+namespace lumicut {
+
+namespace {
+constexpr uint32_t kMaxSurfaces = 64;  // chance ends chains long before
+}
+
+std::optional<ChainRay> start_chain(const Scene& scene, const SurfaceHit& hit, const Vec3f& to_viewer,
+                                    const Rgb& throughput, uint32_t pixel, Rng rng) {
+  const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float(), luck = rng.next_float();
+  const auto f = follow(scene, hit, to_viewer, choice, u, v);
+  if (!f) return {};
+  const Rgb weight = throughput * f->weight;
+  const float survive = std::min(1.0f, max_component(weight));
+  if (!(luck < survive)) return {};
+  return ChainRay{f->origin, f->direction, weight / survive, pixel, rng};
+}
+
+void follow_chains(const Scene& scene, const LampSurfaces& lamps, std::vector<ChainRay> chains, EyeHits& hits,
+                   Counters& counters) {
+  std::vector<RayHit> rays;
+  for (uint32_t depth = 0; depth < kMaxSurfaces && !chains.empty(); ++depth) {
+    rays.assign(chains.size(), {});
+    for (size_t i = 0; i < chains.size(); ++i)
+      rays[i].ray.org = chains[i].origin, rays[i].ray.dir = chains[i].direction;
+    scene.accel().intersect(rays);
+    counters.rays += rays.size();
+    std::vector<ChainRay> next;
+    for (size_t i = 0; i < chains.size(); ++i) {
+      const ChainRay& chain = chains[i];
+      if (!lamps.empty())
+        lamps.for_each_hit(chain.origin, chain.direction, rays[i].ray.tfar, [&](const LampSurfaces::Hit& lamp) {
+          hits.add(chain.throughput * lamp.radiance, chain.pixel, scene.lights()[lamp.lamp].group);
+        });
+      if (rays[i].hit.geom == kNoId) {
+        const Rgb light = chain.throughput * scene.environment_radiance(chain.direction);
+        if (max_component(light) > 0.0f) hits.add(light, chain.pixel, scene.environment().group);
+        continue;
+      }
+      const SurfaceHit surface = scene.surface(rays[i]);
+      const Vec3f to_viewer = -chain.direction;
+      const Rgb light = chain.throughput * scene.emitted(surface, to_viewer);
+      if (max_component(light) > 0.0f) hits.add(light, chain.pixel, scene.meshes()[surface.mesh].group);
+      SurfacePoint point = scene.shade_point(surface, to_viewer, chain.pixel);
+      point.attenuate(chain.throughput);
+      if (!Bsdf(point).black()) hits.found.push_back(point);
+      if (auto ray = start_chain(scene, surface, to_viewer, chain.throughput, chain.pixel, chain.rng))
+        next.push_back(*ray);
+    }
+    chains = std::move(next);
+  }
+}
+
+}  // namespace lumicut

@@ -1,0 +1,26 @@
+// What mirrors and glass show: rays that follow their lobes until surfaces that virtual lights can shade.
+#pragma once
+
+#include "core/stats.h"
+#include "integrators/eye_hits.h"
+#include "scene/followed.h"
+#include "vpl/lamp_surfaces.h"
+
+namespace lumicut {
+
+struct ChainRay {
+  Vec3f origin, direction;
+  Rgb throughput{};
+  uint32_t pixel = 0;
+  Rng rng;
+};
+
+// The ray that goes on from a surface with such a lobe, if chance keeps it; `throughput`: of what the surface shows.
+std::optional<ChainRay> start_chain(const Scene& scene, const SurfaceHit& hit, const Vec3f& to_viewer,
+                                    const Rgb& throughput, uint32_t pixel, Rng rng);
+
+// Follows the rays to their ends. Lamps with an area are seen in mirrors, though not by the camera itself.
+void follow_chains(const Scene& scene, const LampSurfaces& lamps, std::vector<ChainRay> rays, EyeHits& hits,
+                   Counters& counters);
+
+}  // namespace lumicut
