@@ -171,20 +171,23 @@ HWY_INLINE void Bounds(const LightNode& node, const PointBlock& block, float cla
         beta = CosineToBox(d, to_center, half, Load3(d, block.mirror_tangent, i), Load3(d, block.mirror_bitangent, i),
                            mirror);
       const V shininess = hn::Load(d, block.shininess + i);
-      V lobe = zero;
-      V3 share = specular;
-      auto ggx = hn::Lt(shininess, zero);
-      if (kLobes == Lobes::cosine || !hn::AllTrue(d, ggx))
-        lobe = BoundOfLobe(d, beta, kLobes == Lobes::cosine ? shininess : hn::Max(zero, shininess));
-      if (kLobes == Lobes::ggx && !hn::AllFalse(d, ggx)) {
-        const V nv = Dot(normal, mirror), alpha2 = Square(shininess);
-        lobe = hn::IfThenElse(ggx, BoundOfGgxLobe(d, beta, cosine, alpha2, alpha2, nv), lobe);
-        const V fresnel = hn::IfThenElseZero(ggx, BoundOfFresnel(d, beta, nv));
-        share = BoundOfSchlick(d, specular, Load3(d, block.grazing, i), fresnel);
-        const V fading = BoundOfFading(d, hn::Load(d, block.fade + i), cosine);
-        f = {hn::Mul(f.x, fading), hn::Mul(f.y, fading), hn::Mul(f.z, fading)};
+      if constexpr (kLobes == Lobes::cosine) {
+        const V lobe = BoundOfLobe(d, beta, shininess);
+        f = {hn::MulAdd(specular.x, lobe, f.x), hn::MulAdd(specular.y, lobe, f.y), hn::MulAdd(specular.z, lobe, f.z)};
+      } else {
+        const auto ggx = hn::Lt(shininess, zero);
+        V lobe = hn::AllTrue(d, ggx) ? zero : BoundOfLobe(d, beta, hn::Max(zero, shininess));
+        V3 share = specular;
+        if (!hn::AllFalse(d, ggx)) {
+          const V nv = Dot(normal, mirror), alpha2 = Square(shininess);
+          lobe = hn::IfThenElse(ggx, BoundOfGgxLobe(d, beta, cosine, alpha2, alpha2, nv), lobe);
+          const V fresnel = hn::IfThenElseZero(ggx, BoundOfFresnel(d, beta, nv));
+          share = BoundOfSchlick(d, specular, Load3(d, block.grazing, i), fresnel);
+          const V fading = BoundOfFading(d, hn::Load(d, block.fade + i), cosine);
+          f = {hn::Mul(f.x, fading), hn::Mul(f.y, fading), hn::Mul(f.z, fading)};
+        }
+        f = {hn::MulAdd(share.x, lobe, f.x), hn::MulAdd(share.y, lobe, f.y), hn::MulAdd(share.z, lobe, f.z)};
       }
-      f = {hn::MulAdd(share.x, lobe, f.x), hn::MulAdd(share.y, lobe, f.y), hn::MulAdd(share.z, lobe, f.z)};
     }
     hn::StoreU(BoundOfLuminance(d, f, geometry, node.intensity), d, bounds + i);
   }
@@ -192,9 +195,9 @@ HWY_INLINE void Bounds(const LightNode& node, const PointBlock& block, float cla
 
 template <VplKind kKind>
 HWY_INLINE void BoundsOfKind(const LightNode& node, const PointBlock& block, float clamp2, float* bounds) {
-  if (block.ggx) return Bounds<kKind, Lobes::ggx>(node, block, clamp2, bounds);
-  block.glossy ? Bounds<kKind, Lobes::cosine>(node, block, clamp2, bounds)
-               : Bounds<kKind, Lobes::none>(node, block, clamp2, bounds);
+  if (!block.glossy) return Bounds<kKind, Lobes::none>(node, block, clamp2, bounds);
+  block.ggx ? Bounds<kKind, Lobes::ggx>(node, block, clamp2, bounds)
+            : Bounds<kKind, Lobes::cosine>(node, block, clamp2, bounds);
 }
 
 // light_node_bounds, to be inlined.
