@@ -37,6 +37,7 @@ struct SceneData {
   std::vector<Material> materials;
   std::vector<Mesh> meshes;
   std::vector<lumicut_light> lights;
+  std::vector<std::string> light_names;  // where each stands in the file: "lights[3]"
   std::optional<lumicut_environment> environment;
   lumicut_camera camera{};
   uint32_t width = 512, height = 512, samples = 1;  // what the scene file proposes

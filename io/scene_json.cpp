@@ -510,7 +510,12 @@ class SceneReader {
       return;
     }
     object.finish();
+    add_light(value, light);
+  }
+
+  void add_light(const JsonValue& value, const lumicut_light& light) {
     scene_.lights.push_back(light);
+    scene_.light_names.push_back(value.path());
   }
 
   void read_area_light(JsonObject& object, lumicut_light& light) {
@@ -534,7 +539,7 @@ class SceneReader {
     if (visible) {
       add_visible_light(object, light, centre, u, v);
     } else {
-      scene_.lights.push_back(light);
+      add_light(object.value(), light);
     }
   }
 

@@ -50,5 +50,6 @@ void add_compare(CLI::App& app);
 void add_bench(CLI::App& app);
 void add_report(CLI::App& app);
 void add_info(CLI::App& app);
+void add_check(CLI::App& app);
 
 }  // namespace lumicut::tools
