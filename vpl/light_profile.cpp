@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "core/rng.h"
+#include "vpl/vpl.h"
 
 namespace lumicut {
 
@@ -141,6 +142,15 @@ uint32_t keep_profile(LightProfile profile) {
     r.slots[i].store(new LightProfile(std::move(profile)), std::memory_order_release);
     return id;
   }
+}
+
+float profile_share(const Vpl& v, const Vec3f& direction) {
+  const LightProfile* profile = find_profile(v.profile);
+  if (profile == nullptr) return 0.0f;
+  const Vec3f tangent = v.tangent(), bitangent = cross(tangent, v.normal);
+  const float vertical = std::acos(std::clamp(dot(direction, v.normal), -1.0f, 1.0f));
+  const float horizontal = std::atan2(dot(direction, bitangent), dot(direction, tangent));
+  return (*profile)(vertical, horizontal < 0.0f ? horizontal + static_cast<float>(2 * kPi) : horizontal);
 }
 
 const LightProfile* find_profile(uint32_t id) {

@@ -1,5 +1,5 @@
-// Measured lamps: intensity by direction, as photometric files have it. Tables live as long as the process and are named
-// by a hash of their content, so that VPLs carry the name through files, states and kernels alike.
+// Measured lamps: intensity by direction, as photometric files have it. Tables live as long as the process and are
+// named by a hash of their content, so that VPLs carry the name through files, states and kernels alike.
 #pragma once
 
 #include <cstdint>
@@ -12,9 +12,9 @@ namespace lumicut {
 
 class LightProfile {
  public:
-  // `vertical`: angles from the axis, radians, rising within [0, π], at least two. `horizontal`: angles about it, rising
-  // from 0 to 2π, or a single one: the same all around. `values`: vertical.size() for each horizontal angle, not below 0
-  // and not all 0. Throws Error naming the value.
+  // `vertical`: angles from the axis, radians, rising within [0, π], at least two. `horizontal`: angles about it,
+  // rising from 0 to 2π, or a single one: the same all around. `values`: vertical.size() for each horizontal angle, not
+  // below 0 and not all 0. Throws Error naming the value.
   LightProfile(std::vector<float> vertical, std::vector<float> horizontal, std::vector<float> values);
 
   float largest() const { return largest_; }

@@ -115,7 +115,8 @@ double TextureIntegral::mean(Vec2f a, Vec2f b, Vec2f c) const {
   const Vec2f uv[3] = {a, b, c};
   const double shift = nearest_ ? 0.0 : 0.5;
   for (int k = 0; k < 3; ++k)
-    p[k][0] = uv[k].x * static_cast<double>(width_) - shift, p[k][1] = (1.0 - uv[k].y) * static_cast<double>(height_) - shift;
+    p[k][0] = uv[k].x * static_cast<double>(width_) - shift,
+    p[k][1] = (1.0 - uv[k].y) * static_cast<double>(height_) - shift;
   double crossings = 0, low = p[0][0];
   for (int k = 0; k < 3; ++k) {
     const auto& q = p[(k + 1) % 3];
@@ -123,8 +124,7 @@ double TextureIntegral::mean(Vec2f a, Vec2f b, Vec2f c) const {
     low = std::min(low, p[k][0]);
   }
   if (!(crossings < kMostCrossings)) return average_;
-  const double area2 =
-      (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[2][0] - p[0][0]) * (p[1][1] - p[0][1]);
+  const double area2 = (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[2][0] - p[0][0]) * (p[1][1] - p[0][1]);
   if (std::abs(area2) < 1e-9 * (1 + crossings * crossings)) {
     // A segment or a point: means along the edges, and never 0 where the segment might meet light between them.
     const int samples = 2 + static_cast<int>(4 * crossings);

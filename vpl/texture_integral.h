@@ -1,8 +1,8 @@
 // Exact means of a filtered texture over triangles: the power of textured emitters, one by one.
 // By Green's theorem the integral over a triangle is that of the antiderivative along u around its edges; within a cell
-// of the bilinear interpolant that is a cubic, which two Gauss points integrate exactly. Costs the texels that the edges
-// cross, not those inside. Departs from exact where a texture has more than 2^24 texels (boxes of texels are averaged
-// first) and where a triangle's edges cross more than 2^20 texels (the texture's mean stands for it).
+// of the bilinear interpolant that is a cubic, which two Gauss points integrate exactly. Costs the texels that the
+// edges cross, not those inside. Departs from exact where a texture has more than 2^24 texels (boxes of texels are
+// averaged first) and where a triangle's edges cross more than 2^20 texels (the texture's mean stands for it).
 #pragma once
 
 #include <vector>
