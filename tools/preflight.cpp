@@ -277,9 +277,27 @@ class Examiner {
     if (!(total > 0)) say("no_light", "nothing in the scene emits: the image will be black");
   }
 
+  // ∫ values dω of a profile: linear in the angle times its sine.
+  static double solid_angle(const io::Profile& p) {
+    double sum = 0;
+    const size_t n = p.vertical.size(), columns = std::max<size_t>(2, p.horizontal.size()) - 1;
+    for (size_t column = 0; column < columns; ++column) {
+      const size_t other = p.horizontal.size() == 1 ? 0 : column + 1;
+      const double width = p.horizontal.size() == 1 ? 2 * kPi : double{p.horizontal[other]} - p.horizontal[column];
+      for (size_t i = 0; i + 1 < n; ++i) {
+        const double a = 0.5 * (double{p.values[column * n + i]} + p.values[other * n + i]);
+        const double b = 0.5 * (double{p.values[column * n + i + 1]} + p.values[other * n + i + 1]);
+        const double t0 = p.vertical[i], t1 = p.vertical[i + 1];
+        sum += width * (a * std::cos(t0) - b * std::cos(t1) + (b - a) / (t1 - t0) * (std::sin(t1) - std::sin(t0)));
+      }
+    }
+    return sum;
+  }
+
   double power_of(const lumicut_light& l) const {
     const double value = double{l.value} * luminance(l.color);
     const bool watt = l.unit == LUMICUT_WATT;
+    if (l.profile > 0) return value * solid_angle(scene_.profiles[l.profile - 1]) / (watt ? 4 * kPi : 1.0);
     switch (l.type) {
       case LUMICUT_POINT:
         return watt ? value : 4 * kPi * value;
