@@ -648,13 +648,11 @@ class SceneReader {
     environment.group = group(object);
     const double strength = object.number("strength", 1, 0, 1e15);
     store(environment.color, object.vector3("color", {1, 1, 1}, 0, 1e15) * strength);
+    if (auto sky = object.find("sky"); sky && object.has("image")) sky->fail("give either \"image\" or \"sky\"");
     if (auto image = object.find("image"))
       environment.texture =
           textures_.get(resolve(*image), TextureUse::radiance, 0, fmt::format("the environment ({})", path_));
-    if (auto sky = object.find("sky")) {
-      if (object.has("image")) sky->fail("give either \"image\" or \"sky\"");
-      read_sky(*sky, value, environment, strength);
-    }
+    if (auto sky = object.find("sky")) read_sky(*sky, value, environment, strength);
     // World to map: its up axis becomes z; with y up, x stays x, and -z becomes y.
     const double angle = radians(object.number("rotation", 0, -36000, 36000));
     const double c = std::cos(angle), s = std::sin(angle);
