@@ -43,7 +43,7 @@ struct SceneData {
   std::vector<Material> materials;
   std::vector<Mesh> meshes;
   std::vector<Profile> profiles;
-  std::vector<lumicut_light> lights;  // profile numbers are 1 + index into `profiles`
+  std::vector<lumicut_light> lights;     // profile numbers are 1 + index into `profiles`
   std::vector<std::string> light_names;  // where each stands in the file: "lights[3]"
   std::optional<lumicut_environment> environment;
   lumicut_camera camera{};

@@ -111,7 +111,7 @@ struct lumicut_scene_t : lumicut::ObjectOf<lumicut_scene_t> {
   lumicut::Work work;
   lumicut::Scene scene;
   std::vector<lumicut::KeptProfile> profiles;  // for lights that are set after
-  bool changed = true;  // beside the camera; which needs no new build and no new lights
+  bool changed = true;                         // beside the camera; which needs no new build and no new lights
   bool camera_changed = false;
   std::unique_ptr<lumicut::Stats> stats = std::make_unique<lumicut::Stats>();
   std::string stats_text;
