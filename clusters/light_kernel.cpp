@@ -99,7 +99,7 @@ Rgb light_point(const Vpl& light, const Rgb& intensity, float clamp2, const Surf
     geometry = 1.0f / std::max(dist2, clamp2);
     const float cosine = -dot(light.normal, to_light);
     if (light.kind == VplKind::oriented) geometry *= std::max(0.0f, cosine);
-    if (light.kind == VplKind::spot) geometry *= spot_profile(light, cosine);
+    if (light.kind == VplKind::spot) geometry *= spot_profile(light, -to_light);
   }
   geometry *= std::max(0.0f, dot(point.normal, to_light));
   if (!(geometry > 0.0f)) return {};

@@ -159,7 +159,8 @@ void LightTree::add_kind(const std::vector<Vpl>& lights, const std::vector<uint3
     c.directions.extend(v.normal);
     c.intensity = v.intensity;
     // The profile of a narrowed area lamp ends where its cosine does.
-    if (v.kind == VplKind::spot) c.widest_spot = v.spot_cosine > 0.0f ? std::max(0.0f, v.cos_outer) : v.cos_outer;
+    if (v.kind == VplKind::spot)
+      c.widest_spot = v.profile == 0 && v.spot_cosine > 0.0f ? std::max(0.0f, v.cos_outer) : v.cos_outer;
   }
   for (uint32_t k = 0; k < merges.size(); ++k)
     clusters[n + k] = merge(clusters[merges[k].left], clusters[merges[k].right]);

@@ -64,7 +64,7 @@ float cosine_towards(const Vpl& v, const Vec3f& direction) {
     case VplKind::oriented:
       return std::max(0.0f, c);
     case VplKind::spot:
-      return spot_profile(v, c);
+      return spot_profile(v, direction);
     case VplKind::directional:
       break;
   }

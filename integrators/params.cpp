@@ -96,6 +96,10 @@ std::vector<ParamInfo> common_params() {
       {"direct_share", "Direct share",
        "Share of the virtual lights that is spent on the direct light of extended lamps", "", ParamType::real, "0.25",
        0.01, 1},
+      {"environment_vpls", "Environment lights",
+       "How many of the virtual lights stand for the environment; 0: its share of the power among those for direct "
+       "light",
+       "lights", ParamType::integer, "0", 0, 1e8},
       {"clamp_relative", "Clamp (relative)",
        "No virtual light is taken to be nearer than this share of the scene's radius", "of the scene's radius",
        ParamType::real, "0.05", 0, 1},

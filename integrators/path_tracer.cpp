@@ -135,9 +135,8 @@ class PathTracer final : public Integrator {
       add_shadow(path, light, light_point(light, light.intensity / static_cast<float>(delta_.pmf(i)), 0.0f, path.point),
                  rays, shadows);
     }
-    if (!emitters_->has_extended()) return;
-    const float u = path.rng.next_float();
-    const DirectSample s = emitters_->sample_direct(u, 1, path.rng);
+    if (!emitters_->has_extended() && !emitters_->has_environment()) return;
+    const DirectSample s = emitters_->sample_one(path.rng);
     Rgb light = light_point(s.vpl, s.vpl.intensity, 0.0f, path.point);
     if (!(max_component(light) > 0.0f)) return;
     if (s.seen_by_rays) {

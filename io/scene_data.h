@@ -32,11 +32,19 @@ struct Mesh {
   uint32_t group = 0;
 };
 
+// Intensity of a lamp by direction, as lumicut_profile has it.
+struct Profile {
+  std::string file;
+  std::vector<float> vertical, horizontal, values;  // radians; W/sr
+};
+
 struct SceneData {
   std::vector<Texture> textures;
   std::vector<Material> materials;
   std::vector<Mesh> meshes;
-  std::vector<lumicut_light> lights;
+  std::vector<Profile> profiles;
+  std::vector<lumicut_light> lights;     // profile numbers are 1 + index into `profiles`
+  std::vector<std::string> light_names;  // where each stands in the file: "lights[3]"
   std::optional<lumicut_environment> environment;
   lumicut_camera camera{};
   uint32_t width = 512, height = 512, samples = 1;  // what the scene file proposes

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -9,8 +10,10 @@
 #include <map>
 
 #include "io/file_error.h"
+#include "io/ies_file.h"
 #include "io/json_reader.h"
 #include "io/scene_obj.h"
+#include "io/sky.h"
 #include "io/texture_store.h"
 
 namespace lumicut::io {
@@ -524,12 +527,79 @@ class SceneReader {
         light.blend = static_cast<float>(object.number("blend", 0, 0, 1));
         light.spot_cosine = object.boolean("cosine", false);
       }
+      if (auto file = object.find("ies")) read_profile(object, *file, light);
     } else {
       read_area_light(object, light);
       return;
     }
     object.finish();
+    add_light(value, light);
+  }
+
+  // A point lamp with the file's intensities; a spot cuts its cone out of them.
+  void read_profile(JsonObject& object, const JsonValue& file, lumicut_light& light) {
+    if (light.radius > 0) object.need("radius").fail("a lamp with \"ies\" is a point: leave \"radius\" out");
+    const Vec axis = direction(object.need("direction"));
+    store(light.direction, axis);
+    // Horizontal angle 0 lies towards x; `rotation` turns it the way horizontal angles go.
+    Vec zero = Vec{1, 0, 0} - axis * axis[0];
+    if (!(length(zero) > 1e-3)) zero = (z_up_ ? Vec{0, 1, 0} : Vec{0, 0, -1}) - axis * (z_up_ ? axis[1] : -axis[2]);
+    zero = zero * (1.0 / length(zero));
+    const double turn = radians(object.number("rotation", 0, -36000, 36000));
+    store(light.tangent, zero * std::cos(turn) + cross(zero, axis) * std::sin(turn));
+
+    const std::string path = resolve(file);
+    IesProfile ies = read_ies(path);
+    Profile profile;
+    profile.file = path;
+    if (light.type == LUMICUT_SPOT) cut_cone(ies, light);
+    for (const double angle : ies.vertical) profile.vertical.push_back(static_cast<float>(radians(angle)));
+    for (const double angle : ies.horizontal) profile.horizontal.push_back(static_cast<float>(radians(angle)));
+    for (const double candela : ies.candela) profile.values.push_back(static_cast<float>(candela / 683.0));
+    if (!(*std::max_element(profile.values.begin(), profile.values.end()) > 0))
+      file.fail(fmt::format("{} gives no light within the spot's cone", path));
+    const auto same = std::find_if(scene_.profiles.begin(), scene_.profiles.end(), [&](const Profile& p) {
+      return p.vertical == profile.vertical && p.horizontal == profile.horizontal && p.values == profile.values;
+    });
+    light.profile = static_cast<uint32_t>(same - scene_.profiles.begin()) + 1;
+    if (same == scene_.profiles.end()) scene_.profiles.push_back(std::move(profile));
+    light.type = LUMICUT_POINT;
+    light.angle = light.blend = 0, light.spot_cosine = 0;
+  }
+
+  // The table times the spot's falloff, at its own angles and, where the edge is, at finer ones.
+  static void cut_cone(IesProfile& ies, const lumicut_light& spot) {
+    const double half = 0.5 * double{spot.angle}, outer = std::cos(half), width = (1 - outer) * double{spot.blend};
+    std::vector<double> angles = ies.vertical;
+    const double degree = 180 / kPi, soft = std::acos(std::min(1.0, outer + width)) * degree;
+    for (int i = 0; i <= 64; ++i) angles.push_back(soft + (half * degree - soft) * i / 64);
+    for (double a = 1; a < half * degree; a += 1) angles.push_back(a);
+    angles.push_back(std::max(0.0, half * degree - 1e-3));
+    std::sort(angles.begin(), angles.end());
+    std::vector<double> kept;
+    for (const double a : angles)
+      if (a >= ies.vertical.front() && a <= std::min(half * degree, ies.vertical.back()) &&
+          (kept.empty() || a > kept.back() + 5e-4))
+        kept.push_back(a);
+    if (kept.size() < 2) kept = {ies.vertical.front(), ies.vertical.front() + 1e-2};
+    std::vector<double> values;
+    for (size_t h = 0; h < ies.horizontal.size(); ++h)
+      for (const double a : kept) {
+        const double* row = &ies.candela[h * ies.vertical.size()];
+        const auto above = std::upper_bound(ies.vertical.begin(), ies.vertical.end() - 1, a) - ies.vertical.begin();
+        const auto i = static_cast<size_t>(std::max<std::ptrdiff_t>(1, above));
+        const double t = (a - ies.vertical[i - 1]) / (ies.vertical[i] - ies.vertical[i - 1]);
+        const double c = std::cos(a / degree);
+        double x = width > 0 ? std::clamp((c - outer) / width, 0.0, 1.0) : (a < half * degree - 5e-4 ? 1.0 : 0.0);
+        x = x * x * (3 - 2 * x) * (spot.spot_cosine != 0 ? std::max(0.0, c) : 1.0);
+        values.push_back((row[i - 1] * (1 - t) + row[i] * t) * x);
+      }
+    ies.vertical = std::move(kept), ies.candela = std::move(values);
+  }
+
+  void add_light(const JsonValue& value, const lumicut_light& light) {
     scene_.lights.push_back(light);
+    scene_.light_names.push_back(value.path());
   }
 
   void read_area_light(JsonObject& object, lumicut_light& light) {
@@ -553,7 +623,7 @@ class SceneReader {
     if (visible) {
       add_visible_light(object, light, centre, u, v);
     } else {
-      scene_.lights.push_back(light);
+      add_light(object.value(), light);
     }
   }
 
@@ -597,9 +667,11 @@ class SceneReader {
     environment.group = group(object);
     const double strength = object.number("strength", 1, 0, 1e15);
     store(environment.color, object.vector3("color", {1, 1, 1}, 0, 1e15) * strength);
+    if (auto sky = object.find("sky"); sky && object.has("image")) sky->fail("give either \"image\" or \"sky\"");
     if (auto image = object.find("image"))
       environment.texture =
           textures_.get(resolve(*image), TextureUse::radiance, 0, fmt::format("the environment ({})", path_));
+    if (auto sky = object.find("sky")) read_sky(*sky, value, environment, strength);
     // World to map: its up axis becomes z; with y up, x stays x, and -z becomes y.
     const double angle = radians(object.number("rotation", 0, -36000, 36000));
     const double c = std::cos(angle), s = std::sin(angle);
@@ -622,6 +694,43 @@ class SceneReader {
     if (auto hidden = object.find("hidden"); hidden && hidden->boolean()) environment.flags |= LUMICUT_HIDDEN;
     object.finish();
     scene_.environment = environment;
+  }
+
+  // A map of the sky and a lamp for the sun.
+  void read_sky(const JsonValue& value, const JsonValue& owner, lumicut_environment& environment, double strength) {
+    for (const char* key : {"rotation", "world_to_map"})
+      if (owner.raw().contains(key)) value.fail(fmt::format("a sky turns by \"sun_rotation\": leave \"{}\" out", key));
+    JsonObject object(value);
+    Sky sky;
+    const auto elevation = object.need("sun_elevation");
+    sky.sun_elevation = elevation.number(-90, 90);
+    if (!(sky.sun_elevation > 0)) elevation.fail_expected("above 0: the model has no sun below the horizon");
+    sky.sun_azimuth = object.number("sun_rotation", 0, -36000, 36000);
+    sky.turbidity = object.number("turbidity", 3, 1.9, 10);
+    const double radius = object.number("sun_angular_radius", 0.2666, 0, 45);
+    const bool sun = object.boolean("sun", true);
+    const Vec ground = object.vector3("ground", {0, 0, 0}, 0, 1);
+    const auto height = static_cast<uint32_t>(object.integer("resolution", 256, 16, 4096));
+    object.finish();
+    Texture texture;
+    texture.file = "sky";
+    texture.width = 2 * height, texture.height = height, texture.channels = 3;
+    texture.floats = sky.map(height, ground, sun);
+    scene_.textures.push_back(std::move(texture));
+    environment.texture = static_cast<int32_t>(scene_.textures.size());
+    if (!sun) return;
+    lumicut_light light{};
+    light.struct_size = sizeof(light);
+    light.type = LUMICUT_SUN;
+    light.group = environment.group;
+    light.value = static_cast<float>(strength);
+    const Vec irradiance = sky.sun_irradiance(), towards = sky.sun_direction();
+    for (size_t k = 0; k < 3; ++k)
+      light.color[k] =
+          static_cast<float>(irradiance[k] * (strength > 0 ? double{environment.color[k]} / strength : 0.0));
+    store(light.direction, (z_up_ ? towards : Vec{towards[0], towards[2], -towards[1]}) * -1.0);
+    light.radius = static_cast<float>(radians(radius));
+    add_light(value, light);
   }
 
   // A scene without light renders black, which is legal and seldom meant.

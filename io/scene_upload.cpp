@@ -37,6 +37,16 @@ void upload_scene(const Api& api, lumicut_scene scene, const SceneData& data) {
     uint32_t id = 0;
     check(api, api.scene_add_mesh(scene, &m, &id), fmt::format("mesh {}", mesh.name));
   }
+  std::vector<lumicut_profile> profiles;
+  for (const auto& profile : data.profiles) {
+    lumicut_profile p{};
+    p.struct_size = sizeof(p);
+    p.vertical_count = static_cast<uint32_t>(profile.vertical.size());
+    p.horizontal_count = static_cast<uint32_t>(profile.horizontal.size());
+    p.vertical = profile.vertical.data(), p.horizontal = profile.horizontal.data(), p.values = profile.values.data();
+    profiles.push_back(p);
+  }
+  if (!profiles.empty()) check(api, api.scene_set_profiles(scene, profiles.data(), profiles.size()), "profiles");
   if (!data.lights.empty()) check(api, api.scene_set_lights(scene, data.lights.data(), data.lights.size()), "lights");
   if (data.environment) check(api, api.scene_set_environment(scene, &*data.environment), "environment");
   check(api, api.scene_set_camera(scene, &data.camera), "camera");

@@ -45,6 +45,7 @@ void check(const std::string& path, uint64_t index, lumicut_vpl& light) {
   for (const float i : light.intensity)
     if (!std::isfinite(i) || i < 0)
       fail("intensity is " + shown(light.intensity) + ", but must be finite and not negative");
+  if (light.kind != LUMICUT_VPL_SPOT) light.profile = 0;
   if (!all_finite(&light.cos_outer, 4)) fail("the spot cone is not finite");
   if (light.kind == LUMICUT_VPL_OMNI) return;
   double length = 0;
@@ -75,7 +76,6 @@ std::vector<lumicut_vpl> read_vpls(const std::string& path) {
                                         sizeof(lumicut_vpl)));
     lights.resize(header.count);
     if (header.count > 0) std::memcpy(lights.data(), bytes.data() + sizeof(header), room);
-    for (auto& light : lights) light.reserved = 0;
   } else {
     // The peer's: a count and bare records of position, MINUS the normal, intensity.
     uint64_t count = 0;

@@ -7,6 +7,7 @@
 #include "plugin/include/lumicut/lumicut_state.h"
 #include "plugin/objects.h"
 #include "plugin/state.h"
+#include "vpl/light_profile.h"
 #include "vpl/trace_vpls.h"
 
 using namespace lumicut;
@@ -119,7 +120,8 @@ void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uin
   if (h.lights > 0) std::memcpy(static_cast<void*>(vpls->lights.data()), at, h.lights * sizeof(Vpl));
   at += h.lights * sizeof(Vpl);
   for (const Vpl& v : vpls->lights)
-    if (static_cast<uint32_t>(v.kind) >= kVplKinds || !is_finite(v.position) || !is_finite(v.normal))
+    if (static_cast<uint32_t>(v.kind) >= kVplKinds || !is_finite(v.position) || !is_finite(v.normal) ||
+        (v.profile != 0 && find_profile(v.profile) == nullptr))
       fail_bytes("a light in it makes no sense");
 
   auto next = std::make_unique<Prepared>();

@@ -7,6 +7,7 @@
 #include "core/parallel.h"
 #include "plugin/check.h"
 #include "plugin/descriptors.h"
+#include "vpl/light_profile.h"
 
 namespace lumicut {
 
@@ -161,7 +162,28 @@ Mesh to_mesh(const lumicut_mesh& in) {
   return mesh;
 }
 
-Light to_light(const lumicut_light& in, uint64_t index) {
+KeptProfile to_profile(const lumicut_profile& in, uint64_t index) {
+  const Checked c("lumicut_profile", index);
+  c.integer("vertical_count", in.vertical_count, 2, 65536);
+  c.integer("horizontal_count", in.horizontal_count, 1, 65536);
+  if (in.reserved != 0) c.fail_unknown("reserved", number_text(uint64_t{in.reserved}) + " is not 0");
+  const auto copied = [&](const char* name, const float* values, size_t count) {
+    if (values == nullptr) c.fail(name, "is NULL");
+    return std::vector<float>(values, values + count);
+  };
+  try {
+    const LightProfile profile(copied("vertical", in.vertical, in.vertical_count),
+                               copied("horizontal", in.horizontal, in.horizontal_count),
+                               copied("values", in.values, size_t{in.vertical_count} * in.horizontal_count));
+    return {keep_profile(profile), profile.largest()};
+  } catch (const Error& error) {
+    const std::string text = error.what();
+    if (text.rfind("lumicut_profile", 0) == 0) throw;
+    throw Error(error.code(), "lumicut_profile[" + number_text(index) + "]: " + text);
+  }
+}
+
+Light to_light(const lumicut_light& in, uint64_t index, const std::vector<KeptProfile>& profiles) {
   const Checked c("lumicut_light", index);
   c.integer("type", in.type, LUMICUT_POINT, LUMICUT_SUN);
   c.integer("unit", in.unit, LUMICUT_RADIOMETRIC, LUMICUT_WATT);
@@ -194,6 +216,20 @@ Light to_light(const lumicut_light& in, uint64_t index) {
   }
 
   double scale = in.value;  // of `color`, radiometric
+  if (in.profile != 0) {
+    if (!point) c.fail("profile", std::string("a ") + type_name(in.type) + " has none; point lamps do");
+    if (in.profile > profiles.size())
+      c.fail("profile", number_text(uint64_t{in.profile}) + " is out of range: the scene has " +
+                            number_text(uint64_t{profiles.size()}) + " profiles");
+    light.profile = profiles[in.profile - 1].id;
+    scale *= profiles[in.profile - 1].largest;
+    light.direction = c.direction("direction", in.direction);
+    c.finite("tangent", in.tangent);
+    const Vec3f given = vec(in.tangent);
+    const Vec3f across = given - light.direction * dot(given, light.direction);
+    if (given != Vec3f{} && !(length2(across) > 1e-10f * length2(given))) c.fail("tangent", "is parallel to direction");
+    light.tangent = given != Vec3f{} ? normalize(across) : Frame(light.direction).t;
+  }
   if (area) {
     c.finite("u", in.u);
     c.finite("v", in.v);
@@ -310,7 +346,9 @@ VplSet to_vpls(const lumicut_vpl* lights, uint64_t count) {
     c.integer("kind", in.kind, LUMICUT_VPL_OMNI, LUMICUT_VPL_SPOT);
     c.integer("group", in.group, 0, kMaxGroup);
     c.not_negative("intensity", in.intensity);
-    if (in.reserved != 0.0f) c.fail_unknown("reserved", number_text(in.reserved) + " is not 0");
+    if (in.profile != 0 && in.kind != LUMICUT_VPL_SPOT) c.fail("profile", "only spots have one");
+    if (in.profile != 0 && find_profile(in.profile) == nullptr)
+      c.fail("profile", number_text(uint64_t{in.profile}) + " is no profile that a scene was given");
     Vpl& vpl = set.lights[i];
     vpl.kind = static_cast<VplKind>(in.kind);
     vpl.group = in.group;
@@ -326,7 +364,15 @@ VplSet to_vpls(const lumicut_vpl* lights, uint64_t count) {
       // Those that are unit as far as floats go stay as they are, so that a set goes out and in again unchanged.
       vpl.normal = std::abs(l - 1.0) > 1e-6 ? vec(in.normal) * static_cast<float>(1.0 / l) : vec(in.normal);
     }
-    if (vpl.kind == VplKind::spot) {
+    if (in.profile != 0) {
+      c.range("cos_outer", in.cos_outer, -1.0f, 1.0f);
+      const float tangent[3] = {in.blend, in.spot_cosine, in.spread_tan};
+      c.finite("blend", tangent);
+      if (std::abs(length(vec_double(tangent)) - 1.0) > 1e-2 || std::abs(dot(vec(tangent), vpl.normal)) > 1e-2f)
+        c.fail("blend", "with spot_cosine and spread_tan is no unit vector orthogonal to the normal");
+      vpl.cos_outer = in.cos_outer, vpl.profile = in.profile;
+      vpl.blend_cosine = in.blend, vpl.spot_cosine = in.spot_cosine, vpl.spread_tan = in.spread_tan;
+    } else if (vpl.kind == VplKind::spot) {
       c.range("cos_outer", in.cos_outer, -1.0f, 1.0f);
       c.range("blend", in.blend, 0.0f, 2.0f);
       c.range("spot_cosine", in.spot_cosine, 0.0f, 1.0f);

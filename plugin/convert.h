@@ -13,10 +13,17 @@
 
 namespace lumicut {
 
+// A profile kept [vpl/light_profile.h], and its largest value.
+struct KeptProfile {
+  uint32_t id = 0;
+  float largest = 0.0f;
+};
+
 Texture to_texture(const lumicut_texture& in, uint64_t index);
 Material to_material(const lumicut_material& in, uint64_t index);
 Mesh to_mesh(const lumicut_mesh& in);
-Light to_light(const lumicut_light& in, uint64_t index);
+Light to_light(const lumicut_light& in, uint64_t index, const std::vector<KeptProfile>& profiles);
+KeptProfile to_profile(const lumicut_profile& in, uint64_t index);
 Environment to_environment(const lumicut_environment& in);
 Camera to_camera(const lumicut_camera& in);
 

@@ -43,7 +43,10 @@ LUMICUT_DESCRIPTOR(lumicut_material, F(struct_size), F(flags), F(diffuse), F(shi
 LUMICUT_DESCRIPTOR(lumicut_mesh, F(struct_size), F(mask), F(positions), F(normals), F(uvs), F(vertex_count), F(indices),
                    F(triangle_count), F(materials), F(transforms), F(transform_count), F(material), F(group));
 LUMICUT_DESCRIPTOR(lumicut_light, F(struct_size), F(type), F(unit), F(group), F(color), F(value), F(position),
-                   F(radius), F(direction), F(angle), F(u), F(blend), F(v), F(spread), F(spot_cosine));
+                   F(radius), F(direction), F(angle), F(u), F(blend), F(v), F(spread), F(spot_cosine), F(profile),
+                   F(tangent));
+LUMICUT_DESCRIPTOR(lumicut_profile, F(struct_size), F(vertical_count), F(horizontal_count), F(reserved), F(vertical),
+                   F(horizontal), F(values));
 LUMICUT_DESCRIPTOR(lumicut_environment, F(struct_size), F(group), F(color), F(texture), F(world_to_map), F(flags));
 LUMICUT_DESCRIPTOR(lumicut_camera, F(struct_size), F(orthographic), F(to_world), F(fov_y), F(height), F(shift),
                    F(near_clip), F(far_clip), F(pixel_aspect), F(lens_radius), F(focus_distance));

@@ -110,6 +110,7 @@ VplOptions vpl_options(const Params& params) {
   VplOptions o;
   o.count = static_cast<uint32_t>(params.integer("vpls"));
   o.direct_share = static_cast<float>(params.real("direct_share"));
+  o.environment_count = static_cast<uint32_t>(params.integer("environment_vpls"));
   o.max_depth = static_cast<uint32_t>(params.integer("max_depth"));
   o.seed = static_cast<uint64_t>(params.integer("seed"));
   return o;
@@ -125,7 +126,7 @@ std::string params_text(const Params& params) {
 
 std::string tracing_key(const Params& params) {
   std::string out;
-  for (const char* name : {"vpls", "direct_share", "max_depth", "seed"})
+  for (const char* name : {"vpls", "direct_share", "environment_vpls", "max_depth", "seed"})
     out += std::string(name) + "=" + *params.text(name) + "\n";
   return out;
 }

@@ -14,6 +14,7 @@
 #include "core/stats.h"
 #include "integrators/integrator.h"
 #include "plugin/boundary.h"
+#include "plugin/convert.h"
 #include "scene/scene.h"
 
 namespace lumicut {
@@ -109,7 +110,8 @@ struct lumicut_scene_t : lumicut::ObjectOf<lumicut_scene_t> {
   lumicut::Gate gate{lumicut::HandleKind::scene};
   lumicut::Work work;
   lumicut::Scene scene;
-  bool changed = true;  // beside the camera; which needs no new build and no new lights
+  std::vector<lumicut::KeptProfile> profiles;  // for lights that are set after
+  bool changed = true;                         // beside the camera; which needs no new build and no new lights
   bool camera_changed = false;
   std::unique_ptr<lumicut::Stats> stats = std::make_unique<lumicut::Stats>();
   std::string stats_text;

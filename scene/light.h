@@ -23,6 +23,8 @@ struct Light {
   bool spot_cosine = false;
   Vec3f u{}, v{};              // rectangle: whole edges; disk: whole axes; emits towards u×v
   float spread = 3.14159265f;  // rectangle, disk: opening angle; π: Lambertian
+  uint32_t profile = 0;  // point: id of a LightProfile [vpl/light_profile.h] about `direction`, `value` its largest
+  Vec3f tangent{};       // profile: unit, where its horizontal angle 0 lies; orthogonal to `direction`
 };
 
 struct Environment {

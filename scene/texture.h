@@ -28,6 +28,8 @@ class Texture {
 
   uint32_t width() const { return width_; }
   uint32_t height() const { return height_; }
+  bool clamped() const { return options_.clamp; }
+  bool nearest() const { return options_.nearest; }
   // Linear colour of one texel, row 0 on top.
   Rgb texel(uint32_t x, uint32_t y) const;
   // Mean linear colour.

@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -21,6 +20,8 @@
 #include "io/vpl_file.h"
 #include "tools/commands.h"
 #include "tools/heat_map.h"
+#include "tools/interrupt_watcher.h"
+#include "tools/preflight.h"
 #include "tools/progress_bar.h"
 #include "tools/render_setup.h"
 
@@ -41,45 +42,6 @@ struct Options : RenderSetup {
 };
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
-
-// Turns Ctrl-C into lumicut_cancel of the object that works now. The handler itself may only set a flag.
-class InterruptWatcher {
- public:
-  explicit InterruptWatcher(const io::Api& api)
-      : thread_([this, &api] {
-          while (!done_) {
-            if (void* handle = interrupted ? handle_.load() : nullptr) api.cancel(handle);
-            std::this_thread::sleep_for(std::chrono::milliseconds(20));
-          }
-        }) {}
-  ~InterruptWatcher() {
-    done_ = true;
-    thread_.join();
-  }
-  void watch(void* handle) { handle_ = handle; }
-
- private:
-  std::atomic<void*> handle_{nullptr};
-  std::atomic<bool> done_{false};
-  std::thread thread_;
-};
-
-// "512x384" -> {512, 384}; "a,b,c,d" with ','.
-std::vector<uint32_t> numbers(const std::string& text, char separator, size_t count, const char* option) {
-  std::vector<uint32_t> result;
-  size_t start = 0;
-  while (start <= text.size()) {
-    const size_t end = std::min(text.find(separator, start), text.size());
-    const std::string word = text.substr(start, end - start);
-    if (word.empty() || word.size() > 6 || word.find_first_not_of("0123456789") != std::string::npos)
-      throw UsageError(fmt::format("{} {}: \"{}\" is not a whole number", option, text, word));
-    result.push_back(static_cast<uint32_t>(std::stoul(word)));
-    start = end + 1;
-  }
-  if (result.size() != count)
-    throw UsageError(fmt::format("{} {}: {} numbers instead of {}", option, text, result.size(), count));
-  return result;
-}
 
 struct Channel {
   std::string name;
@@ -106,28 +68,6 @@ std::vector<Channel> choose_channels(const io::Api& api, const std::string& aske
     chosen.push_back(*at);
   }
   return chosen;
-}
-
-// `count` squares of kSquare pixels (less at the edges), spread evenly over the frame whatever their number; all of it
-// when there are no more. [Roberts 2018, R2 sequence]
-std::vector<lumicut_tile> choose_squares(uint32_t width, uint32_t height, uint32_t count) {
-  constexpr uint32_t kSquare = 32;
-  const uint32_t across = (width + kSquare - 1) / kSquare, down = (height + kSquare - 1) / kSquare;
-  count = std::min(count, across * down);
-  std::vector<bool> taken(size_t{across} * down);
-  std::vector<lumicut_tile> squares;
-  for (uint64_t i = 0; squares.size() < count; ++i) {
-    const auto place = [&](double step, uint32_t cells) {
-      const double x = 0.5 + static_cast<double>(i) * step;
-      return std::min(static_cast<uint32_t>((x - std::floor(x)) * cells), cells - 1);
-    };
-    const uint32_t x = place(0.7548776662466927, across), y = place(0.5698402909980532, down);
-    if (taken[size_t{y} * across + x]) continue;
-    taken[size_t{y} * across + x] = true;
-    squares.push_back({sizeof(lumicut_tile), x * kSquare, y * kSquare, std::min(width, (x + 1) * kSquare),
-                       std::min(height, (y + 1) * kSquare)});
-  }
-  return squares;
 }
 
 void log_message(void* user, int32_t level, const char* text) {
@@ -172,6 +112,7 @@ class RenderCommand {
     create_integrator();  // a wrong parameter shall not wait for big files
     read_scene();
     commit();
+    tell();
     render();
     write(channels);
   }
@@ -221,9 +162,9 @@ class RenderCommand {
   void read_scene() {
     const double start = now();
     bar_.show("reading files", 0, 0);
-    const io::SceneData data = io::read_scene(o_.scene);
+    io::SceneData data = io::read_scene(o_.scene);
     bar_.wipe();
-    if (o_.verbosity >= 1)
+    if (o_.verbosity == 1)  // above that they are told with all else
       for (const auto& warning : data.warnings) fmt::print(stderr, "lumicut: warning: {}\n", warning);
     stop_if_interrupted();
     io::upload_scene(api(), scene_.get(), data);
@@ -250,6 +191,17 @@ class RenderCommand {
         (crop_[0] >= crop_[2] || crop_[1] >= crop_[3] || crop_[2] > desc_.width || crop_[3] > desc_.height))
       throw UsageError(fmt::format("--crop {}: is not a part of {} x {} pixels", o_.crop, desc_.width, desc_.height));
     read_seconds_ = now() - start;
+    if (o_.verbosity >= 2) told_ = std::make_unique<io::SceneData>(std::move(data));
+  }
+
+  // What `lumicut check` says, without its forecast.
+  void tell() {
+    if (!told_) return;
+    for (const auto& line : preflight_lines(preflight(
+             api(), device_.get(), *told_, preflight_options(api(), integrator_.get(), desc_.width, desc_.height))))
+      fmt::print(stderr, "lumicut: {}\n", line);
+    told_.reset();
+    stop_if_interrupted();
   }
 
   void set_lights() {
@@ -479,8 +431,9 @@ class RenderCommand {
   io::Handle<lumicut_scene> scene_{library_.api()};
   io::Handle<lumicut_integrator> integrator_{library_.api()};
   std::vector<std::pair<lumicut_tile, io::Handle<lumicut_render>>> parts_;
-  InterruptWatcher watcher_;         // ends before the handles that it may cancel
-  std::vector<lumicut_vpl> lights_;  // of --vpl-in
+  InterruptWatcher watcher_;             // ends before the handles that it may cancel
+  std::vector<lumicut_vpl> lights_;      // of --vpl-in
+  std::unique_ptr<io::SceneData> told_;  // at high verbosity, until it is told of
   std::vector<uint32_t> size_, crop_;
   lumicut_render_desc desc_{};
   uint64_t triangles_ = 0;

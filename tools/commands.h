@@ -51,5 +51,6 @@ void add_mix(CLI::App& app);
 void add_bench(CLI::App& app);
 void add_report(CLI::App& app);
 void add_info(CLI::App& app);
+void add_check(CLI::App& app);
 
 }  // namespace lumicut::tools

@@ -26,6 +26,7 @@ int run(int argc, char** argv) {
   CLI::App app(
       "Lumicut renders global illumination from many virtual lights.\n\n"
       "  lumicut info                                         what the library offers\n"
+      "  lumicut check scene.json                             what looks wrong in a scene, and what it will cost\n"
       "  lumicut render scene.json -i lightcuts -o out.exr    an image\n"
       "  lumicut render scene.json -i exhaustive -o ref.exr   the same from all lights: the reference\n"
       "  lumicut compare out.exr ref.exr                      how far the one is from the other\n"
@@ -43,6 +44,7 @@ int run(int argc, char** argv) {
   add_mix(app);
   add_bench(app);
   add_report(app);
+  add_check(app);
   add_info(app);
   const auto complain = [](const char* text, int code) {
     fmt::print(stderr, "lumicut: {}\n", text);

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
 
 #include "tools/commands.h"
 
@@ -47,6 +49,42 @@ void create_integrator(const io::Api& api, const RenderSetup& setup, lumicut_dev
       throw UsageError(fmt::format("-p {}: must be name=value", parameter));
     set(parameter.substr(0, equals), parameter.substr(equals + 1));
   }
+}
+
+std::vector<uint32_t> numbers(const std::string& text, char separator, size_t count, const char* option) {
+  std::vector<uint32_t> result;
+  size_t start = 0;
+  while (start <= text.size()) {
+    const size_t end = std::min(text.find(separator, start), text.size());
+    const std::string word = text.substr(start, end - start);
+    if (word.empty() || word.size() > 6 || word.find_first_not_of("0123456789") != std::string::npos)
+      throw UsageError(fmt::format("{} {}: \"{}\" is not a whole number", option, text, word));
+    result.push_back(static_cast<uint32_t>(std::stoul(word)));
+    start = end + 1;
+  }
+  if (result.size() != count)
+    throw UsageError(fmt::format("{} {}: {} numbers instead of {}", option, text, result.size(), count));
+  return result;
+}
+
+std::vector<lumicut_tile> choose_squares(uint32_t width, uint32_t height, uint32_t count) {
+  constexpr uint32_t kSquare = 32;
+  const uint32_t across = (width + kSquare - 1) / kSquare, down = (height + kSquare - 1) / kSquare;
+  count = std::min(count, across * down);
+  std::vector<bool> taken(size_t{across} * down);
+  std::vector<lumicut_tile> squares;
+  for (uint64_t i = 0; squares.size() < count; ++i) {
+    const auto place = [&](double step, uint32_t cells) {
+      const double x = 0.5 + static_cast<double>(i) * step;
+      return std::min(static_cast<uint32_t>((x - std::floor(x)) * cells), cells - 1);
+    };
+    const uint32_t x = place(0.7548776662466927, across), y = place(0.5698402909980532, down);
+    if (taken[size_t{y} * across + x]) continue;
+    taken[size_t{y} * across + x] = true;
+    squares.push_back({sizeof(lumicut_tile), x * kSquare, y * kSquare, std::min(width, (x + 1) * kSquare),
+                       std::min(height, (y + 1) * kSquare)});
+  }
+  return squares;
 }
 
 }  // namespace lumicut::tools

@@ -30,4 +30,11 @@ void create_scene(const io::Api& api, const RenderSetup& setup, lumicut_device d
 void create_integrator(const io::Api& api, const RenderSetup& setup, lumicut_device device,
                        io::Handle<lumicut_integrator>& integrator);
 
+// "512x384" -> {512, 384}; "a,b,c,d" with ','. Throws UsageError.
+std::vector<uint32_t> numbers(const std::string& text, char separator, size_t count, const char* option);
+
+// `count` squares of 32 pixels (less at the edges), spread evenly over the frame whatever their number; all of it when
+// there are no more. [Roberts 2018, R2 sequence]
+std::vector<lumicut_tile> choose_squares(uint32_t width, uint32_t height, uint32_t count);
+
 }  // namespace lumicut::tools

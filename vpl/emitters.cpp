@@ -2,6 +2,10 @@
 
 #include <numbers>
 
+#include "core/parallel.h"
+#include "vpl/light_profile.h"
+#include "vpl/texture_integral.h"
+
 namespace lumicut {
 
 namespace {
@@ -52,12 +56,21 @@ Vpl spot_of(const Light& l) {
   return v;
 }
 
+// A point lamp with a measured profile.
+Vpl profiled(const Light& l, const LightProfile& profile) {
+  Vpl v;
+  v.kind = VplKind::spot, v.position = l.position, v.normal = l.direction, v.intensity = l.value, v.group = l.group;
+  v.profile = l.profile, v.cos_outer = profile.cos_outer();
+  v.blend_cosine = l.tangent.x, v.spot_cosine = l.tangent.y, v.spread_tan = l.tangent.z;
+  return v;
+}
+
 // ∫ profile dω by the midpoint rule over the cosine: smooth, 1024 cells are exact to 1e-6.
 double profile_solid_angle(const Vpl& spot) {
   constexpr int kCells = 1024;
   const double lo = std::max(-1.0f, spot.cos_outer), width = 1.0 - lo;
   double sum = 0.0;
-  for (int i = 0; i < kCells; ++i) sum += spot_profile(spot, static_cast<float>(lo + width * (i + 0.5) / kCells));
+  for (int i = 0; i < kCells; ++i) sum += spot_falloff(spot, static_cast<float>(lo + width * (i + 0.5) / kCells));
   return 2.0 * std::numbers::pi * width * sum / kCells;
 }
 
@@ -66,7 +79,7 @@ double profile_solid_angle(const Vpl& spot) {
 Rgb lamp_radiance(const Light& light, float cosine) {
   if (!narrowed(light)) return light.value;
   const Vpl profile = spread_profile(light);
-  return light.value * profile.intensity * (spot_profile(profile, cosine) / cosine);
+  return light.value * profile.intensity * (spot_falloff(profile, cosine) / cosine);
 }
 
 DiscreteDistribution::DiscreteDistribution(const std::vector<double>& weights) {
@@ -76,115 +89,178 @@ DiscreteDistribution::DiscreteDistribution(const std::vector<double>& weights) {
 }
 
 size_t DiscreteDistribution::sample(double u) const {
-  // First entry whose cumulative sum passes u·total: entries of weight 0 are never first.
-  const auto it = std::upper_bound(cdf_.begin() + 1, cdf_.end(), u * total_);
-  size_t i = std::min<size_t>(it - cdf_.begin() - 1, size() - 1);
-  while (i > 0 && cdf_[i + 1] == cdf_[i]) --i;  // u·total rounded up to the total
+  double rest;
+  return sample(u, 0, size(), rest);
+}
+
+size_t DiscreteDistribution::sample(double u, size_t first, size_t last, double& rest) const {
+  // First entry whose cumulative sum passes u·sum: entries of weight 0 are never first.
+  const double at = cdf_[first] + u * (cdf_[last] - cdf_[first]);
+  const auto begin = cdf_.begin() + static_cast<std::ptrdiff_t>(first) + 1;
+  const auto it = std::upper_bound(begin, cdf_.begin() + static_cast<std::ptrdiff_t>(last) + 1, at);
+  size_t i = std::min<size_t>(static_cast<size_t>(it - cdf_.begin()) - 1, last - 1);
+  while (i > first && cdf_[i + 1] == cdf_[i]) --i;  // rounded up to the sum
+  rest = std::clamp((at - cdf_[i]) / (cdf_[i + 1] - cdf_[i]), 0.0, 1.0);
   return i;
 }
 
-void Emitters::add(const Emitter& e, double power, bool extended) {
-  if (!(power > 0.0)) return;
-  emitters_.push_back(e);
-  weights_.push_back(power);
-  if (extended) {
-    extended_.push_back(e);
-    extended_weights_.push_back(power);
+void Emitters::add_lamps(std::vector<double>& weights) {
+  const double world_area = std::numbers::pi * scene_.radius() * scene_.radius();
+  // Those that a VPL each stands for first, then the environment, then those with extent.
+  for (const bool extended : {false, true}) {
+    if (extended) {
+      const double power = environment_power();
+      if (power > 0.0) emitters_.push_back({Kind::environment, 0, 0, 0}), weights.push_back(power);
+      environment_share_ = power;  // until the others' power is known
+      extended_ = emitters_.size();
+    }
+    const auto add = [&](Kind kind, uint32_t lamp, double power, bool extent) {
+      if (!(power > 0.0) || extent != extended) return;
+      emitters_.push_back({kind, lamp, 0, 0});
+      weights.push_back(power);
+    };
+    for (uint32_t i = 0; i < scene_.lights().size(); ++i) {
+      const Light& l = scene_.lights()[i];
+      const double value = luminance(l.value);
+      if (!(max_component(l.value) > 0.0f)) continue;
+      Vpl v;
+      v.group = l.group;
+      v.intensity = l.value;
+      const auto stands = [&](const Vpl& vpl) {
+        if (!extended) delta_.push_back(vpl);
+      };
+      switch (l.type) {
+        case LightType::point:
+          if (const LightProfile* profile = l.profile != 0 ? find_profile(l.profile) : nullptr) {
+            // Measured from afar: its sphere blurs the edges of shadows alone.
+            add(Kind::profile, i, value * profile->solid_angle(), false);
+            stands(profiled(l, *profile));
+            break;
+          }
+          add(l.radius > 0 ? Kind::sphere : Kind::point, i, 4 * std::numbers::pi * value, l.radius > 0);
+          if (!(l.radius > 0)) v.position = l.position, stands(v);
+          break;
+        case LightType::spot:
+          // A spot's sphere blurs the edge of its shadows alone; it is taken as a point here.
+          add(Kind::spot, i, value * profile_solid_angle(spot_of(l)), false);
+          stands(spot_of(l));
+          break;
+        case LightType::rectangle:
+        case LightType::disk: {
+          const bool disk = l.type == LightType::disk;
+          const double area = length(cross(l.u, l.v)) * (disk ? std::numbers::pi / 4 : 1.0);
+          add(disk ? Kind::disk : Kind::rectangle, i, std::numbers::pi * area * value, true);
+          break;
+        }
+        case LightType::sun:
+          add(Kind::sun, i, world_area * value, l.radius > 0);
+          if (!(l.radius > 0)) v.kind = VplKind::directional, v.normal = l.direction, stands(v);
+          break;
+      }
+    }
   }
 }
 
-Emitters::Emitters(const Scene& scene) : scene_(scene) {
-  const double world_area = std::numbers::pi * scene.radius() * scene.radius();
-  for (uint32_t i = 0; i < scene.lights().size(); ++i) {
-    const Light& l = scene.lights()[i];
-    const double value = luminance(l.value);
-    if (!(max_component(l.value) > 0.0f)) continue;
-    Vpl v;
-    v.group = l.group;
-    v.intensity = l.value;
-    switch (l.type) {
-      case LightType::point:
-        add({l.radius > 0 ? Kind::sphere : Kind::point, i, 0, 0}, 4 * std::numbers::pi * value, l.radius > 0);
-        if (!(l.radius > 0)) {
-          v.position = l.position;
-          delta_.push_back(v);
-        }
-        break;
-      case LightType::spot:
-        // A spot's sphere blurs the edge of its shadows alone; it is taken as a point here.
-        add({Kind::spot, i, 0, 0}, value * profile_solid_angle(spot_of(l)), false);
-        delta_.push_back(spot_of(l));
-        break;
-      case LightType::rectangle:
-      case LightType::disk: {
-        const bool disk = l.type == LightType::disk;
-        const double area = length(cross(l.u, l.v)) * (disk ? std::numbers::pi / 4 : 1.0);
-        add({disk ? Kind::disk : Kind::rectangle, i, 0, 0}, std::numbers::pi * area * value, true);
-        break;
+double Emitters::environment_power() {
+  const Environment& env = scene_.environment();
+  if (env.black()) return 0.0;
+  double integral = 4 * std::numbers::pi * luminance(env.color);
+  if (env.texture >= 0) {
+    const Texture& t = scene_.textures()[env.texture];
+    std::vector<double> weights(size_t{t.width()} * t.height());
+    for (uint32_t y = 0; y < t.height(); ++y) {
+      const double sine = std::sin(std::numbers::pi * (y + 0.5) / t.height());
+      for (uint32_t x = 0; x < t.width(); ++x) {
+        // The largest of the texel and its neighbours: bilinear filtering spreads light to texels that are black.
+        float top = 0.0f;
+        for (int dy = -1; dy <= 1; ++dy)
+          for (int dx = -1; dx <= 1; ++dx)
+            top = std::max(top, luminance(t.texel(
+                                    (x + t.width() + dx) % t.width(),
+                                    std::clamp<int>(static_cast<int>(y) + dy, 0, static_cast<int>(t.height()) - 1))));
+        weights[size_t{y} * t.width() + x] = top * sine;
       }
-      case LightType::sun:
-        add({Kind::sun, i, 0, 0}, world_area * value, l.radius > 0);
-        if (!(l.radius > 0)) {
-          v.kind = VplKind::directional, v.normal = l.direction;
-          delta_.push_back(v);
+    }
+    texels_ = DiscreteDistribution(weights);
+    integral = luminance(env.color * t.average()) > 0.0f && !texels_.empty()
+                   ? luminance(env.color) * texels_.total() * 2 * std::numbers::pi * std::numbers::pi / weights.size()
+                   : 0.0;
+  }
+  return std::numbers::pi * scene_.radius() * scene_.radius() * integral;
+}
+
+void Emitters::add_triangles(std::vector<double>& weights) {
+  const auto& materials = scene_.materials();
+  size_t count = 0;
+  for (uint32_t m = 0; m < scene_.meshes().size(); ++m) {
+    const Mesh& mesh = scene_.meshes()[m];
+    for (uint32_t t = 0; t < mesh.triangle_count(); ++t)
+      if (materials[mesh.material_of(t)].emissive()) count += scene_.instance_count(m);
+  }
+  if (count == 0) return;
+  emitters_.reserve(emitters_.size() + count);
+  weights.reserve(weights.size() + count);
+
+  // Where a texture emits, each triangle has the mean of its own part. A mesh whose power is not textured has none.
+  textured_.resize(scene_.meshes().size());
+  for (uint32_t id = 0; id < materials.size(); ++id) {
+    const Material& material = materials[id];
+    if (!material.emissive() || material.emission_texture < 0) continue;
+    std::unique_ptr<TextureIntegral> integral;
+    for (uint32_t m = 0; m < scene_.meshes().size(); ++m) {
+      const Mesh& mesh = scene_.meshes()[m];
+      const bool used = mesh.triangle_materials.empty()
+                            ? mesh.material == id
+                            : std::find(mesh.triangle_materials.begin(), mesh.triangle_materials.end(), id) !=
+                                  mesh.triangle_materials.end();
+      if (!used) continue;
+      if (!integral)
+        integral = std::make_unique<TextureIntegral>(scene_.textures()[material.emission_texture], material.emission);
+      textured_[m].resize(mesh.triangle_count());
+      parallel_chunks(mesh.triangle_count(), 1024, [&](size_t begin, size_t end) {
+        for (size_t t = begin; t < end; ++t) {
+          if (mesh.material_of(static_cast<uint32_t>(t)) != id) continue;
+          const uint32_t* v = &mesh.indices[3 * t];
+          textured_[m][t] =
+              static_cast<float>(mesh.uvs.empty() ? integral->mean({}, {}, {})
+                                                  : integral->mean(mesh.uvs[v[0]], mesh.uvs[v[1]], mesh.uvs[v[2]]));
         }
-        break;
+      });
     }
   }
 
-  if (!scene.environment().black()) {
-    const Environment& env = scene.environment();
-    double integral = 4 * std::numbers::pi * luminance(env.color);
-    if (env.texture >= 0) {
-      const Texture& t = scene.textures()[env.texture];
-      std::vector<double> weights(size_t{t.width()} * t.height());
-      for (uint32_t y = 0; y < t.height(); ++y) {
-        const double sine = std::sin(std::numbers::pi * (y + 0.5) / t.height());
-        for (uint32_t x = 0; x < t.width(); ++x) {
-          // The largest of the texel and its neighbours: bilinear filtering spreads light to texels that are black.
-          float top = 0.0f;
-          for (int dy = -1; dy <= 1; ++dy)
-            for (int dx = -1; dx <= 1; ++dx)
-              top = std::max(top, luminance(t.texel(
-                                      (x + t.width() + dx) % t.width(),
-                                      std::clamp<int>(static_cast<int>(y) + dy, 0, static_cast<int>(t.height()) - 1))));
-          weights[size_t{y} * t.width() + x] = top * sine;
-        }
-      }
-      texels_ = DiscreteDistribution(weights);
-      integral = luminance(env.color * t.average()) > 0.0f && !texels_.empty()
-                     ? luminance(env.color) * texels_.total() * 2 * std::numbers::pi * std::numbers::pi / weights.size()
-                     : 0.0;
-    }
-    environment_power_ = world_area * integral;
-    add({Kind::environment, 0, 0, 0}, environment_power_, true);
-  }
-
-  texture_mean_.assign(scene.textures().size(), Rgb{-1, 0, 0});
-  for (uint32_t m = 0; m < scene.meshes().size(); ++m) {
-    const Mesh& mesh = scene.meshes()[m];
+  for (uint32_t m = 0; m < scene_.meshes().size(); ++m) {
+    const Mesh& mesh = scene_.meshes()[m];
     for (uint32_t t = 0; t < mesh.triangle_count(); ++t) {
-      const Material& material = scene.materials()[mesh.material_of(t)];
+      const Material& material = materials[mesh.material_of(t)];
       if (!material.emissive()) continue;
-      Rgb emission = material.emission;
-      if (material.emission_texture >= 0) {
-        Rgb& mean = texture_mean_[material.emission_texture];
-        if (mean.x < 0.0f) mean = scene.textures()[material.emission_texture].average();
-        emission = emission * mean;
-      }
-      for (uint32_t i = 0; i < scene.instance_count(m); ++i) {
-        const Transform& to_world = scene.instance(m, i);
+      const double emission = material.emission_texture >= 0 ? textured_[m][t] : luminance(material.emission);
+      for (uint32_t i = 0; i < scene_.instance_count(m); ++i) {
+        const Transform& to_world = scene_.instance(m, i);
         const uint32_t* index = &mesh.indices[3 * size_t{t}];
         const Vec3f a = to_world.point(mesh.positions[index[0]]), b = to_world.point(mesh.positions[index[1]]),
                     c = to_world.point(mesh.positions[index[2]]);
         const double area = 0.5 * length(cross(b - a, c - a));
-        add({Kind::triangle, m, i, t},
-            std::numbers::pi * area * luminance(emission) * (material.emit_both_sides ? 2 : 1), true);
+        const double power = std::numbers::pi * area * emission * (material.emit_both_sides ? 2 : 1);
+        if (!(power > 0.0)) continue;
+        emitters_.push_back({Kind::triangle, m, i, t});
+        weights.push_back(power);
       }
     }
   }
-  power_ = DiscreteDistribution(weights_);
-  extended_power_ = DiscreteDistribution(extended_weights_);
+}
+
+Emitters::Emitters(const Scene& scene) : scene_(scene) {
+  std::vector<double> weights;
+  add_lamps(weights);
+  add_triangles(weights);
+  power_ = DiscreteDistribution(weights);
+  const double with_extent = has_extended() ? power_.sum(extended_, emitters_.size()) : 0.0;
+  if (environment_share_ > 0.0) environment_share_ /= environment_share_ + with_extent;
+}
+
+size_t Emitters::bytes() const {
+  return emitters_.capacity() * sizeof(Emitter) + power_.bytes() + texels_.bytes() + delta_.capacity() * sizeof(Vpl);
 }
 
 Emitters::Surface Emitters::sample_surface(const Emitter& e, Rng& rng) const {
@@ -225,27 +301,50 @@ Emitters::Surface Emitters::sample_surface(const Emitter& e, Rng& rng) const {
           4.0f / (kPi * parallelogram)};
 }
 
-Vec3f Emitters::sample_environment(Rng& rng, Rgb& radiance, float& pdf) const {
+Vec3f Emitters::sample_environment(double u, double v, Rgb& radiance, float& pdf) const {
   const Environment& env = scene_.environment();
   if (env.texture < 0) {
     radiance = env.color;
     pdf = 0.25f / kPi;
-    return uniform_sphere(rng.next_float(), rng.next_float());
+    return uniform_sphere(static_cast<float>(u), static_cast<float>(v));
   }
   const Texture& t = scene_.textures()[env.texture];
-  const size_t i = texels_.sample((static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32);
-  const auto x = static_cast<float>(i % t.width()), y = static_cast<float>(i / t.width());
-  const float u = (x + rng.next_float()) / static_cast<float>(t.width());
-  const float v = 1.0f - (y + rng.next_float()) / static_cast<float>(t.height());
-  const float phi = (0.5f - u) * 2.0f * kPi, theta = (v - 0.5f) * kPi;  // theta: elevation
-  const Vec3f d{std::cos(theta) * std::cos(phi), std::cos(theta) * std::sin(phi), std::sin(theta)};
+  // The row by u, the texel within it by v, the place in the texel by what is left of both.
+  double down, along;
+  const size_t y = texels_.sample(u, 0, texels_.size(), down) / t.width();
+  const size_t first = y * t.width(), last = first + t.width();
+  down = std::clamp((texels_.sum(0, first) - u * texels_.total()) / -texels_.sum(first, last), 0.0, 1.0);
+  const size_t i = texels_.sample(v, first, last, along);
+  const double theta = (0.5 - (static_cast<double>(y) + down) / t.height()) * std::numbers::pi;  // elevation
+  const double phi = (0.5 - (static_cast<double>(i - first) + along) / t.width()) * 2 * std::numbers::pi;
+  const Vec3d local{std::cos(theta) * std::cos(phi), std::cos(theta) * std::sin(phi), std::sin(theta)};
+  const Vec3f d{static_cast<float>(local.x), static_cast<float>(local.y), static_cast<float>(local.z)};
   const float* m = env.world_to_map;  // a rotation: its transpose leads back
   const Vec3f world = normalize(Vec3f{m[0] * d.x + m[3] * d.y + m[6] * d.z, m[1] * d.x + m[4] * d.y + m[7] * d.z,
                                       m[2] * d.x + m[5] * d.y + m[8] * d.z});
-  pdf = static_cast<float>(texels_.pmf(i) * static_cast<double>(texels_.size())) /
-        (2.0f * kPi * kPi * std::max(1e-6f, std::cos(theta)));
+  pdf = static_cast<float>(texels_.pmf(i) * static_cast<double>(texels_.size()) /
+                           (2 * std::numbers::pi * std::numbers::pi * std::max(1e-6, std::cos(theta))));
   radiance = scene_.environment_radiance(world);
   return world;
+}
+
+Vpl Emitters::environment_light(uint64_t i, uint64_t count, uint64_t seed) const {
+  Rng rng(seed, Stage::light_path, i, 2), all(seed, Stage::light_path, ~uint64_t{0}, 2);
+  double inverse = 0.0, digit = 0.5;  // van der Corput, base 2
+  for (uint64_t n = i; n != 0; n >>= 1, digit *= 0.5)
+    if ((n & 1) != 0) inverse += digit;
+  // Jittered within their strata, shifted as a whole.
+  const double u = (static_cast<double>(i) + rng.next_float()) / static_cast<double>(count);
+  double v = inverse + all.next_float() + rng.next_float() / static_cast<double>(count);
+  v -= std::floor(v);
+  Rgb radiance;
+  float pdf;
+  Vpl vpl;
+  vpl.kind = VplKind::directional;
+  vpl.normal = -sample_environment(u, v, radiance, pdf);
+  vpl.intensity = radiance / (pdf * static_cast<float>(count));
+  vpl.group = scene_.environment().group;
+  return vpl;
 }
 
 Vec3f Emitters::sample_sun(const Light& light, Rng& rng) const {
@@ -253,30 +352,20 @@ Vec3f Emitters::sample_sun(const Light& light, Rng& rng) const {
   return Frame(light.direction).to_world(uniform_cone(std::cos(light.radius), rng.next_float(), rng.next_float()));
 }
 
-DirectSample Emitters::sample_direct(double u, uint64_t count, Rng& rng) const {
-  const size_t i = extended_power_.sample(u);
-  const Emitter& e = extended_[i];
-  const double share = extended_power_.pmf(i);
-  const auto weight = static_cast<float>(1.0 / (share * static_cast<double>(count)));
-  DirectSample s;
-  Vpl& v = s.vpl;
+Vpl Emitters::sample_direct(double u, uint64_t count, Rng& rng) const {
+  double rest;
+  const size_t i = power_.sample(u, extended_, emitters_.size(), rest);
+  const Emitter& e = emitters_[i];
+  const auto weight =
+      static_cast<float>(power_.sum(extended_, emitters_.size()) / (power_.sum(i, i + 1) * static_cast<double>(count)));
+  Vpl v;
   if (e.kind == Kind::sun) {
     const Light& l = scene_.lights()[e.index];
     v.kind = VplKind::directional, v.normal = sample_sun(l, rng), v.intensity = l.value * weight, v.group = l.group;
-  } else if (e.kind == Kind::environment) {
-    Rgb radiance;
-    float pdf;
-    v.kind = VplKind::directional;
-    v.normal = -sample_environment(rng, radiance, pdf);
-    v.intensity = radiance * (weight / pdf);
-    v.group = scene_.environment().group;
-    s.seen_by_rays = true, s.density = share * pdf;
-  } else {
-    float area_pdf;
-    v = surface_light(e, weight, rng, area_pdf);
-    s.seen_by_rays = e.kind != Kind::sphere, s.density = share * area_pdf;
+    return v;
   }
-  return s;
+  float area_pdf;
+  return surface_light(e, weight, rng, area_pdf);
 }
 
 Vpl Emitters::surface_light(const Emitter& e, float weight, Rng& rng, float& area_pdf) const {
@@ -292,13 +381,49 @@ Vpl Emitters::surface_light(const Emitter& e, float weight, Rng& rng, float& are
   return v;
 }
 
+DirectSample Emitters::sample_one(Rng& rng) const {
+  DirectSample s;
+  const double choice = (static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32;
+  if (choice < environment_share_) {
+    const double u = (static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32, v = rng.next_float();
+    Rgb radiance;
+    float pdf;
+    s.vpl.kind = VplKind::directional;
+    s.vpl.normal = -sample_environment(u, v, radiance, pdf);
+    s.density = environment_share_ * pdf;
+    s.vpl.intensity = radiance / static_cast<float>(s.density);
+    s.vpl.group = scene_.environment().group;
+    s.seen_by_rays = true;
+    return s;
+  }
+  double rest;
+  const double u = (choice - environment_share_) / (1.0 - environment_share_);
+  const size_t i = power_.sample(std::min(u, 1.0 - 0x1p-40), extended_, emitters_.size(), rest);
+  const Emitter& e = emitters_[i];
+  const double share = (1.0 - environment_share_) * power_.sum(i, i + 1) / power_.sum(extended_, emitters_.size());
+  const auto weight = static_cast<float>(1.0 / share);
+  if (e.kind == Kind::sun) {
+    const Light& l = scene_.lights()[e.index];
+    s.vpl.kind = VplKind::directional, s.vpl.normal = sample_sun(l, rng), s.vpl.intensity = l.value * weight;
+    s.vpl.group = l.group;
+    return s;
+  }
+  float area_pdf;
+  s.vpl = surface_light(e, weight, rng, area_pdf);
+  s.seen_by_rays = e.kind != Kind::sphere, s.density = share * area_pdf;
+  return s;
+}
+
 Vpl Emitters::sample_lamp(uint32_t lamp, Rng& rng) const {
   const Light& l = scene_.lights()[lamp];
   if (l.type == LightType::spot) return spot_of(l);
-  if (l.type == LightType::point && !(l.radius > 0.0f)) {
-    Vpl v;
-    v.position = l.position, v.intensity = l.value, v.group = l.group;
-    return v;
+  if (l.type == LightType::point) {
+    if (const LightProfile* profile = l.profile != 0 ? find_profile(l.profile) : nullptr) return profiled(l, *profile);
+    if (!(l.radius > 0.0f)) {
+      Vpl v;
+      v.position = l.position, v.intensity = l.value, v.group = l.group;
+      return v;
+    }
   }
   const Kind kind =
       l.type == LightType::point ? Kind::sphere : (l.type == LightType::disk ? Kind::disk : Kind::rectangle);
@@ -306,24 +431,24 @@ Vpl Emitters::sample_lamp(uint32_t lamp, Rng& rng) const {
   return surface_light({kind, lamp, 0, 0}, 1.0f, rng, area_pdf);
 }
 
+double Emitters::area_density(double emission) const {
+  // The area of the emitter, and the side where both emit, cancel.
+  return (1.0 - environment_share_) * std::numbers::pi * emission / power_.sum(extended_, emitters_.size());
+}
+
 double Emitters::mesh_density(const SurfaceHit& surface) const {
   const Material& material = scene_.materials()[surface.material];
   if (!material.emissive() || !has_extended()) return 0.0;
-  Rgb emission = material.emission;
-  if (material.emission_texture >= 0) emission = emission * texture_mean_[material.emission_texture];
-  // The area of the triangle, and the side where both emit, cancel.
-  return std::numbers::pi * luminance(emission) / extended_power_.total();
+  return area_density(material.emission_texture >= 0 ? textured_[surface.mesh][surface.triangle]
+                                                     : luminance(material.emission));
 }
 
-double Emitters::lamp_density(uint32_t lamp) const {
-  return std::numbers::pi * luminance(scene_.lights()[lamp].value) / extended_power_.total();
-}
+double Emitters::lamp_density(uint32_t lamp) const { return area_density(luminance(scene_.lights()[lamp].value)); }
 
 double Emitters::environment_density(const Vec3f& towards) const {
-  if (!(environment_power_ > 0.0)) return 0.0;
-  const double share = environment_power_ / extended_power_.total();
+  if (!has_environment()) return 0.0;
   const Environment& env = scene_.environment();
-  if (env.texture < 0) return share * 0.25 / std::numbers::pi;
+  if (env.texture < 0) return environment_share_ * 0.25 / std::numbers::pi;
   const Texture& t = scene_.textures()[env.texture];
   const Vec2f uv = scene_.environment_uv(towards);
   const auto texel = [](double at, uint32_t count) {
@@ -331,7 +456,7 @@ double Emitters::environment_density(const Vec3f& towards) const {
   };
   const uint32_t x = texel(uv.x - std::floor(uv.x), t.width()), y = texel(1.0 - uv.y, t.height());
   const double elevation = (uv.y - 0.5) * std::numbers::pi;
-  return share * texels_.pmf(size_t{y} * t.width() + x) * static_cast<double>(texels_.size()) /
+  return environment_share_ * texels_.pmf(size_t{y} * t.width() + x) * static_cast<double>(texels_.size()) /
          (2.0 * std::numbers::pi * std::numbers::pi * std::max(1e-6, std::cos(elevation)));
 }
 
@@ -358,9 +483,23 @@ EmittedRay Emitters::sample_ray(Rng& rng) const {
     case Kind::spot: {
       const Light& l = scene_.lights()[e.index];
       const Vec3f local = uniform_cone(l.cos_outer, rng.next_float(), rng.next_float());
-      const float profile = spot_profile(spot_of(l), local.z);
+      const float profile = spot_falloff(spot_of(l), local.z);
       ray = {l.position, Frame(l.direction).to_world(local), l.value * (profile * 2.0f * kPi * (1.0f - l.cos_outer)),
              l.group};
+      break;
+    }
+    case Kind::profile: {
+      const Light& l = scene_.lights()[e.index];
+      const LightProfile& profile = *find_profile(l.profile);
+      const double u = (static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32;
+      const float v = rng.next_float();
+      float vertical, horizontal, pdf;
+      profile.sample(u, v, rng.next_float(), vertical, horizontal, pdf);
+      const Vec3f bitangent = cross(l.tangent, l.direction);
+      const Vec3f direction =
+          normalize(l.direction * std::cos(vertical) +
+                    (l.tangent * std::cos(horizontal) + bitangent * std::sin(horizontal)) * std::sin(vertical));
+      ray = {l.position, direction, l.value * (profile(vertical, horizontal) / pdf), l.group};
       break;
     }
     case Kind::sun: {
@@ -372,7 +511,8 @@ EmittedRay Emitters::sample_ray(Rng& rng) const {
     case Kind::environment: {
       Rgb radiance;
       float pdf;
-      const Vec3f towards = sample_environment(rng, radiance, pdf);
+      const double u = (static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32, v = rng.next_float();
+      const Vec3f towards = sample_environment(u, v, radiance, pdf);
       ray = distant_ray(-towards, radiance / pdf, rng);
       ray.group = scene_.environment().group;
       break;
@@ -386,7 +526,7 @@ EmittedRay Emitters::sample_ray(Rng& rng) const {
       float factor = kPi / s.area_pdf;
       if (e.kind != Kind::triangle && narrowed(scene_.lights()[e.index]) && local.z > 0.0f) {
         const Vpl profile = spread_profile(scene_.lights()[e.index]);
-        factor *= profile.intensity.x * spot_profile(profile, local.z) / local.z;
+        factor *= profile.intensity.x * spot_falloff(profile, local.z) / local.z;
       }
       const uint32_t group = e.kind == Kind::triangle ? scene_.meshes()[e.index].group : scene_.lights()[e.index].group;
       ray = {offset(s), Frame(s.normal).to_world(local), s.radiance * factor, group};

@@ -19,6 +19,10 @@ class DiscreteDistribution {
   size_t size() const { return cdf_.empty() ? 0 : cdf_.size() - 1; }
   // u in [0,1). Never an index of weight 0.
   size_t sample(double u) const;
+  // The same among entries [first, last) alone, whose sum must be above 0; `rest`: where u fell within the entry.
+  size_t sample(double u, size_t first, size_t last, double& rest) const;
+  double sum(size_t first, size_t last) const { return cdf_[last] - cdf_[first]; }
+  size_t bytes() const { return cdf_.capacity() * sizeof(double); }
   double pmf(size_t i) const { return (cdf_[i + 1] - cdf_[i]) / total_; }
 
  private:
@@ -33,7 +37,7 @@ struct EmittedRay {
   uint32_t group = 0;
 };
 
-// A virtual light that stands for extended emitters.
+// A virtual light that stands for emitters that are not points.
 struct DirectSample {
   Vpl vpl;
   bool seen_by_rays = false;  // paths may find it too: a mesh, the environment, a rectangle or disk [lamp_surfaces.h]
@@ -50,21 +54,32 @@ class Emitters {
 
   // Lamps without extent: one VPL each, exactly.
   const std::vector<Vpl>& delta_lights() const { return delta_; }
-  // True where some emitter has extent, and so needs many VPLs for its direct light.
-  bool has_extended() const { return !extended_power_.empty(); }
-  // One of `count` VPLs that stand for the extended emitters' direct light; `u` in [0,1) chooses the emitter by power.
-  DirectSample sample_direct(double u, uint64_t count, Rng& rng) const;
+  // True where some emitter beside the environment has extent, and so needs many VPLs for its direct light.
+  bool has_extended() const { return extended_ < emitters_.size(); }
+  // One of `count` VPLs that stand for these emitters' direct light; `u` in [0,1) chooses the emitter by power.
+  Vpl sample_direct(double u, uint64_t count, Rng& rng) const;
+  bool has_environment() const { return environment_share_ > 0.0; }
+  // Of the power of environment and extended emitters.
+  double environment_share() const { return environment_share_; }
+  // VPL i of `count` that stand for the environment: stratified over its importance (a Hammersley set, jittered,
+  // through the map's row and column distributions).
+  Vpl environment_light(uint64_t i, uint64_t count, uint64_t seed) const;
   EmittedRay sample_ray(Rng& rng) const;
+  // One VPL that stands for the direct light of environment and extended emitters, where there are any.
+  DirectSample sample_one(Rng& rng) const;
   // A lamp of the scene (no sun) as one virtual light: a sample of where it emits, exact where it has no extent.
   Vpl sample_lamp(uint32_t lamp, Rng& rng) const;
-  // Density with which sample_direct (of a count of 1) draws a place on an emissive mesh, for each unit of area, and a
-  // direction towards the environment, for each steradian.
+  // Density with which sample_one draws a place on an emissive mesh, on a rectangle or disk, for each unit of area, and
+  // a direction towards the environment, for each steradian.
   double mesh_density(const SurfaceHit& surface) const;
-  double lamp_density(uint32_t lamp) const;  // of a rectangle or disk
+  double lamp_density(uint32_t lamp) const;
   double environment_density(const Vec3f& towards) const;
+  // Emitted by all, W of luminance.
+  double power() const { return power_.total(); }
+  size_t bytes() const;
 
  private:
-  enum class Kind : uint8_t { point, spot, sphere, rectangle, disk, sun, environment, triangle };
+  enum class Kind : uint8_t { point, spot, profile, sphere, rectangle, disk, sun, environment, triangle };
   struct Emitter {
     Kind kind;
     uint32_t index;     // lamp, or mesh
@@ -77,26 +92,32 @@ class Emitters {
     float area_pdf;
   };
 
-  void add(const Emitter& e, double power, bool extended);
+  void add_lamps(std::vector<double>& weights);
+  double environment_power();
+  void add_triangles(std::vector<double>& weights);
   Surface sample_surface(const Emitter& e, Rng& rng) const;
   // A sample as a virtual light that stands for `weight` of the emitter.
   Vpl surface_light(const Emitter& e, float weight, Rng& rng, float& area_pdf) const;
-  // Direction towards the environment, its radiance and density per steradian.
-  Vec3f sample_environment(Rng& rng, Rgb& radiance, float& pdf) const;
+  // Of sample_one: density of a place whose emission has this luminance on average.
+  double area_density(double emission) const;
+  // Direction towards the environment, its radiance and density per steradian, from u and v in [0,1).
+  Vec3f sample_environment(double u, double v, Rgb& radiance, float& pdf) const;
   // Direction in which light of a sun travels.
   Vec3f sample_sun(const Light& light, Rng& rng) const;
   EmittedRay distant_ray(const Vec3f& travel, const Rgb& irradiance, Rng& rng) const;
   Vec3f offset(const Surface& s) const { return s.position + s.normal * scene_.epsilon(); }
 
   const Scene& scene_;
-  std::vector<Emitter> emitters_, extended_;
-  std::vector<double> weights_, extended_weights_;
-  DiscreteDistribution power_, extended_power_;
+  // Those without extent, the environment, and from extended_ on those that need VPLs: one distribution of them all.
+  std::vector<Emitter> emitters_;
+  size_t extended_ = 0;
+  double environment_share_ = 0.0;
+  DiscreteDistribution power_;
   std::vector<Vpl> delta_;
   // Environment: density over texels, rows weighted by the sine of the polar angle.
   DiscreteDistribution texels_;
-  double environment_power_ = 0.0;
-  std::vector<Rgb> texture_mean_;  // of those that emit
+  // Mean luminance that a triangle with a texture emits, by mesh; empty for meshes without.
+  std::vector<std::vector<float>> textured_;
 };
 
 }  // namespace lumicut

@@ -188,18 +188,36 @@ VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progr
   if (emitters.empty()) return set;
   set.lights = emitters.delta_lights();
   const uint64_t budget = options.count > set.lights.size() ? options.count - set.lights.size() : 0;
-  if (emitters.has_extended()) {
+  if (emitters.has_extended() || emitters.has_environment()) {
     const double share = options.max_depth > 0 ? options.direct_share : 1.0;
-    const auto direct = std::max<uint64_t>(1, static_cast<uint64_t>(share * static_cast<double>(budget)));
+    auto direct = std::max<uint64_t>(1, static_cast<uint64_t>(share * static_cast<double>(budget)));
+    uint64_t environment = 0;
+    if (emitters.has_environment()) {
+      environment =
+          options.environment_count > 0
+              ? std::min<uint64_t>(options.environment_count, budget)
+              : static_cast<uint64_t>(std::lround(emitters.environment_share() * static_cast<double>(direct)));
+      environment = std::max<uint64_t>(1, environment);
+      // Given their number, the rest share what is left; by power, they share with the environment.
+      if (options.environment_count > 0)
+        direct = static_cast<uint64_t>(share * static_cast<double>(budget - std::min(budget, environment)));
+      else
+        direct -= std::min(direct, environment);
+      direct = emitters.has_extended() ? std::max<uint64_t>(1, direct) : 0;
+    }
+    for (uint64_t i = 0; i < environment; ++i) {
+      if (i % 4096 == 0) progress.check();
+      const Vpl v = emitters.environment_light(i, environment, options.seed);
+      if (max_component(v.intensity) > 0.0f && is_finite(v.intensity)) set.lights.push_back(v);
+    }
     for (uint64_t i = 0; i < direct; ++i) {
       if (i % 4096 == 0) progress.check();
       Rng rng(options.seed, Stage::light_path, i, 1);
       const Vpl v =
-          emitters.sample_direct((static_cast<double>(i) + rng.next_float()) / static_cast<double>(direct), direct, rng)
-              .vpl;
+          emitters.sample_direct((static_cast<double>(i) + rng.next_float()) / static_cast<double>(direct), direct, rng);
       if (max_component(v.intensity) > 0.0f && is_finite(v.intensity)) set.lights.push_back(v);
     }
-    progress.advance(direct);
+    progress.advance(direct + environment);
   }
   const uint64_t indirect = options.count > set.lights.size() ? options.count - set.lights.size() : 0;
   if (indirect > 0 && options.max_depth > 0 && !scene.bounds().empty())

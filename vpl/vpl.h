@@ -20,12 +20,16 @@ struct Vpl {
   Rgb intensity{};  // W/sr along the normal; directional: irradiance W/m²
   float cos_outer = 0.0f, blend_cosine = 0.0f, spot_cosine = 0.0f;  // spot alone
   float spread_tan = 0.0f;  // spot: narrowed area lamps fall off with max(0, 1 − spread_tan·tanθ)
-  float reserved = 0.0f;
+  // Spot: id of a LightProfile [vpl/light_profile.h] in place of the falloff above; then blend_cosine, spot_cosine and
+  // spread_tan are the unit vector where its horizontal angle 0 lies, and intensity is that of its largest value.
+  uint32_t profile = 0;
+
+  Vec3f tangent() const { return {blend_cosine, spot_cosine, spread_tan}; }
 };
 static_assert(sizeof(Vpl) == 64);
 
-// Share of a spot's intensity at cosine `c` to its axis. The vector twin is in clusters/light_kernel.cpp.
-inline float spot_profile(const Vpl& v, float c) {
+// Share of a spot's intensity at cosine `c` to its axis. The vector twin is in clusters/light_kernel-inl.h.
+inline float spot_falloff(const Vpl& v, float c) {
   float x = v.blend_cosine > 0.0f ? (c - v.cos_outer) / v.blend_cosine : (c > v.cos_outer ? 1.0f : 0.0f);
   x = std::min(1.0f, std::max(0.0f, x));
   x = x * x * (3.0f - 2.0f * x);
@@ -35,6 +39,13 @@ inline float spot_profile(const Vpl& v, float c) {
     x *= std::max(0.0f, 1.0f - v.spread_tan * sine / std::max(c, 1e-6f));
   }
   return x;
+}
+
+// The same of a spot with a profile, towards a unit direction.
+float profile_share(const Vpl& v, const Vec3f& direction);
+
+inline float spot_profile(const Vpl& v, const Vec3f& direction) {
+  return v.profile != 0 ? profile_share(v, direction) : spot_falloff(v, dot(v.normal, direction));
 }
 
 struct VplSet {

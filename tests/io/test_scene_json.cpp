@@ -421,5 +421,83 @@ TEST(SceneJson, OurOwnScenesAreRead) {
   }
 }
 
+// A downlight: 683 cd down, nothing to the sides, twice as much at 90 degrees around as at 0.
+const char kLamp[] = "TILT=NONE\n1 1000 1 2 3 1 2 0 0 0\n1 1 60\n0 90\n0 90 180\n683 0\n1366 0\n683 0\n";
+
+TEST(SceneJson, IesFilesBecomeProfilesOfPointLamps) {
+  const TemporaryFolder folder;
+  folder.write("lamp.ies", kLamp);
+  json scene = json::parse(kScene);
+  const json lamp = {
+      {"type", "point"}, {"position", {0, 0, 2}}, {"value", 3}, {"ies", "lamp.ies"}, {"direction", {0, -2, 0}}};
+  json turned = lamp;
+  turned["rotation"] = 90;
+  json spot = lamp;
+  spot["type"] = "spot", spot["angle"] = 60, spot["blend"] = 0.5;
+  scene["lights"] = {lamp, turned, spot};
+  const SceneData read = read_scene(folder.write("scene.json", scene.dump()));
+  ASSERT_EQ(read.profiles.size(), 2u) << "one file used twice is one profile; the spot's cone is cut out of its own";
+  ASSERT_EQ(read.lights.size(), 3u);
+  EXPECT_EQ(read.lights[0].profile, 1u);
+  EXPECT_EQ(read.lights[1].profile, 1u);
+  EXPECT_EQ(read.lights[2].profile, 2u);
+  EXPECT_EQ(read.lights[2].type, uint32_t{LUMICUT_POINT});
+  const Profile& p = read.profiles[0];
+  EXPECT_EQ(p.values[0], 1.0f) << "candela over 683";
+  EXPECT_EQ(p.horizontal.size(), 5u);
+  EXPECT_NEAR(p.horizontal[4], 2 * M_PI, 1e-6);
+  // Downwards angle 0 lies at +x; a quarter turn leads to x × -y = -z, counter-clockwise seen from above.
+  EXPECT_NEAR(read.lights[0].direction[1], -1, 1e-6);
+  EXPECT_NEAR(read.lights[0].tangent[0], 1, 1e-6);
+  EXPECT_NEAR(read.lights[1].tangent[2], -1, 1e-6);
+  const Profile& cut = read.profiles[1];
+  EXPECT_EQ(cut.values[0], 1.0f);
+  EXPECT_NEAR(cut.vertical.back(), M_PI / 6, 1e-4);
+  EXPECT_NEAR(cut.values[cut.vertical.size() - 1], 0, 1e-6);
+
+  scene["lights"][0].erase("direction");
+  expect_in(error_of([&] { read_scene(folder.write("scene.json", scene.dump())); }), {"lights[0]", "direction"});
+  scene["lights"][0] = lamp, scene["lights"][0]["radius"] = 0.1;
+  expect_in(error_of([&] { read_scene(folder.write("scene.json", scene.dump())); }), {"lights[0].radius", "point"});
+  scene["lights"][0] = lamp, scene["lights"][0]["ies"] = "none.ies";
+  expect_in(error_of([&] { read_scene(folder.write("scene.json", scene.dump())); }), {"none.ies"});
+}
+
+TEST(SceneJson, ASkyIsAMapAndASun) {
+  const auto sky = [](const json& keys) {
+    return changed([&](json& s) { s["environment"] = {{"sky", keys}, {"strength", 0.5}, {"group", 3}}; });
+  };
+  const SceneData scene = sky({{"sun_elevation", 30}, {"sun_rotation", 90}, {"turbidity", 2.5}, {"resolution", 32}});
+  ASSERT_EQ(scene.textures.size(), 1u);
+  EXPECT_EQ(scene.textures[0].width, 64u);
+  EXPECT_EQ(scene.textures[0].floats.size(), 64u * 32 * 3);
+  ASSERT_EQ(scene.lights.size(), 2u);
+  const lumicut_light& sun = scene.lights[1];
+  EXPECT_EQ(sun.type, uint32_t{LUMICUT_SUN});
+  EXPECT_EQ(sun.group, 3u);
+  EXPECT_NEAR(sun.radius, 0.2666 * M_PI / 180, 1e-6);
+  // y is up: 90 degrees lie at -z, and the light travels away from there.
+  EXPECT_NEAR(sun.direction[1], -0.5, 1e-6);
+  EXPECT_NEAR(sun.direction[2], std::sqrt(0.75), 1e-6);
+  EXPECT_EQ(sun.value, 0.5f);
+  EXPECT_GT(sun.color[0], 50.0f);
+  EXPECT_EQ(scene.environment->color[0], 0.5f);
+  EXPECT_EQ(scene.environment->texture, 1);
+  EXPECT_EQ(sky({{"sun_elevation", 30}, {"sun", false}}).lights.size(), 1u);
+
+  const auto refused = [&](const json& keys) { return error_of([&] { sky(keys); }); };
+  expect_in(refused({{"sun_elevation", -3}}), {"environment.sky.sun_elevation", "-3", "below the horizon"});
+  expect_in(refused({{"turbidity", 3}}), {"environment.sky", "sun_elevation"});
+  expect_in(refused({{"sun_elevation", 30}, {"turbidity", 1}}), {"environment.sky.turbidity", "1"});
+  expect_in(error([](json& s) {
+              s["environment"] = {{"sky", {{"sun_elevation", 30}}}, {"rotation", 20}};
+            }),
+            {"environment.sky", "sun_rotation"});
+  expect_in(error([](json& s) {
+              s["environment"] = {{"sky", {{"sun_elevation", 30}}}, {"image", "a.hdr"}};
+            }),
+            {"environment.sky", "image"});
+}
+
 }  // namespace
 }  // namespace lumicut::io

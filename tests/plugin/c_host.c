@@ -57,8 +57,8 @@ int main(int argc, char** argv) {
   lumicut_render render = NULL;
   lumicut_device_desc device_desc = {sizeof device_desc, LUMICUT_ABI_MAJOR, 0, 0, NULL, NULL};
   lumicut_material materials[2] = {
-      {sizeof materials[0], 0, {0.7f, 0.7f, 0.7f}, 0, {0, 0, 0}, 0, {0, 0, 0}, 0, 0, 0, 0},
-      {sizeof materials[0], 0, {0.7f, 0.2f, 0.1f}, 0, {0, 0, 0}, 0, {0, 0, 0}, 0, 0, 0, 0}};
+      {.struct_size = sizeof materials[0], .diffuse = {0.7f, 0.7f, 0.7f}},
+      {.struct_size = sizeof materials[0], .diffuse = {0.7f, 0.2f, 0.1f}}};
   lumicut_mesh mesh = {0};
   lumicut_light lamp = {0};
   lumicut_camera camera = {0};

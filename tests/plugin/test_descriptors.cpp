@@ -197,14 +197,24 @@ TEST(Abi, DescriptorsOfAnySizeAreReadByTheGrowthRule) {
         [&](const void* p) { return lumicut_scene_add_mesh(s.get(), static_cast<const T*>(p), nullptr); });
   }
   {
+    using T = lumicut_profile;
+    const float angles[2] = {0, 1}, values[2] = {3, 1};
+    auto d = make<T>();
+    d.vertical_count = 2, d.horizontal_count = 1, d.vertical = angles, d.horizontal = angles, d.values = values;
+    check_input("lumicut_profile", bytes_of(d),
+                {F(T, struct_size), F(T, vertical_count), F(T, horizontal_count), F(T, reserved), F(T, vertical),
+                 F(T, horizontal), F(T, values)},
+                [&](const void* p) { return lumicut_scene_set_profiles(s.get(), static_cast<const T*>(p), 1); });
+  }
+  {
     using T = lumicut_light;
     auto d = lamp();
     d.spread = 1;
-    check_input(
-        "lumicut_light", bytes_of(d),
-        {F(T, struct_size), F(T, type), F(T, unit), F(T, group), F(T, color), F(T, value), F(T, position), F(T, radius),
-         F(T, direction), F(T, angle), F(T, u), F(T, blend), F(T, v), F(T, spread), F(T, spot_cosine)},
-        [&](const void* p) { return lumicut_scene_set_lights(s.get(), static_cast<const T*>(p), 1); });
+    check_input("lumicut_light", bytes_of(d),
+                {F(T, struct_size), F(T, type), F(T, unit), F(T, group), F(T, color), F(T, value), F(T, position),
+                 F(T, radius), F(T, direction), F(T, angle), F(T, u), F(T, blend), F(T, v), F(T, spread),
+                 F(T, spot_cosine), F(T, profile), F(T, tangent)},
+                [&](const void* p) { return lumicut_scene_set_lights(s.get(), static_cast<const T*>(p), 1); });
   }
   {
     using T = lumicut_environment;

@@ -82,7 +82,7 @@ TEST(Integrators, HostLightsAreCheckedByNameAndValue) {
   refused([](auto& l) { l.intensity[2] = INFINITY; }, LUMICUT_INVALID_ARGUMENT, "lumicut_vpl[2].intensity[2]: inf");
   refused([](auto& l) { l.kind = LUMICUT_VPL_SPOT, l.cos_outer = 2; }, LUMICUT_INVALID_ARGUMENT,
           "lumicut_vpl[2].cos_outer: 2");
-  refused([](auto& l) { l.reserved = 1; }, LUMICUT_UNSUPPORTED, "lumicut_vpl[2].reserved: 1");
+  refused([](auto& l) { l.profile = 1; }, LUMICUT_INVALID_ARGUMENT, "lumicut_vpl[2].profile");
   EXPECT_CODE(lumicut_integrator_set_lights(i.get(), nullptr, 2), LUMICUT_INVALID_ARGUMENT, "count is 2");
 }
 
@@ -210,6 +210,67 @@ TEST(Units, SpreadNarrowsAreaLampsAndKeepsTheirFlux) {
     const double expected = kBrdf * 80 / 4 * n * std::max(0.0, 1 - tangent * std::tan(a)) * c * c / d2;
     EXPECT_NEAR(f.radiance(device, l, Floor::point(x)), expected, 2e-3 * kBrdf * 80 / 4 / 25 * n) << x;
   }
+}
+
+TEST(Units, ProfilesGiveTheIlluminanceOfTheirTable) {
+  const api::Device device(1);
+  Floor f(device);
+  // Every 15 degrees down to 75, quarters apart.
+  const float kDegree = static_cast<float>(kPi / 180);
+  std::vector<float> vertical, horizontal, values;
+  for (int v = 0; v <= 75; v += 15) vertical.push_back(static_cast<float>(v) * kDegree);
+  for (int h = 0; h <= 360; h += 90) horizontal.push_back(static_cast<float>(h) * kDegree);
+  const auto table = [](int v, int h) { return 10.0f + static_cast<float>((h % 4 + 1) * (75 - v)); };
+  for (int h = 0; h <= 4; ++h)
+    for (int v = 0; v <= 75; v += 15) values.push_back(table(v, h));
+  auto p = make<lumicut_profile>();
+  p.vertical_count = static_cast<uint32_t>(vertical.size()),
+  p.horizontal_count = static_cast<uint32_t>(horizontal.size());
+  p.vertical = vertical.data(), p.horizontal = horizontal.data(), p.values = values.data();
+  f.scene.set_profiles({p});
+  auto l = above(LUMICUT_POINT, 2, 3);
+  l.unit = LUMICUT_RADIOMETRIC, l.profile = 1, l.tangent[0] = 5;
+  // Down is -y and angle 0 at +x, so 90 degrees lie at x × -y = -z.
+  const double direction[4][2] = {{1, 0}, {0, -1}, {-1, 0}, {0, 1}};
+  for (int h = 0; h < 4; ++h)
+    for (int v = 15; v <= 60; v += 15) {
+      const double c = std::cos(v * kDegree), r = 2 * std::tan(v * kDegree);
+      auto at = Floor::point();
+      at.position[0] = static_cast<float>(r * direction[h][0]),
+      at.position[2] = static_cast<float>(r * direction[h][1]);
+      const double expected = kBrdf * 3 * table(v, h) * c * c * c / 4;  // I cosθ / d²
+      EXPECT_NEAR(f.radiance(device, l, at), expected, 2e-3 * expected) << v << " " << h;
+    }
+  auto far = Floor::point(2 * std::tan(80 * kDegree));
+  EXPECT_EQ(f.radiance(device, l, far), 0.0f) << "beyond the table";
+}
+
+TEST(Units, ProfilesThatMakeNoSenseAreNamed) {
+  const api::Device device(1);
+  Floor f(device);
+  const float vertical[2] = {0, 1}, horizontal[1] = {0}, values[2] = {1, 2};
+  auto good = make<lumicut_profile>();
+  good.vertical_count = 2, good.horizontal_count = 1;
+  good.vertical = vertical, good.horizontal = horizontal, good.values = values;
+  const auto refused = [&](auto spoil, const char* text) {
+    auto p = good;
+    spoil(p);
+    EXPECT_CODE(lumicut_scene_set_profiles(f.scene.get(), &p, 1), LUMICUT_INVALID_ARGUMENT, text);
+  };
+  refused([](auto& p) { p.vertical_count = 1; }, "lumicut_profile[0].vertical_count: 1");
+  refused([](auto& p) { p.values = nullptr; }, "lumicut_profile[0].values: is NULL");
+  const float falling[2] = {1, 0}, negative[2] = {1, -2};
+  refused([&](auto& p) { p.vertical = falling; }, "vertical[1] = 0");
+  refused([&](auto& p) { p.values = negative; }, "value[1] = -2");
+  f.scene.set_profiles({good});
+  auto l = above(LUMICUT_POINT, 2, 3);
+  l.profile = 2;
+  EXPECT_CODE(lumicut_scene_set_lights(f.scene.get(), &l, 1), LUMICUT_INVALID_ARGUMENT,
+              "lumicut_light[0].profile: 2 is out of range");
+  l.profile = 1, l.tangent[1] = 3;
+  EXPECT_CODE(lumicut_scene_set_lights(f.scene.get(), &l, 1), LUMICUT_INVALID_ARGUMENT, "tangent: is parallel");
+  l.type = LUMICUT_SUN;
+  EXPECT_CODE(lumicut_scene_set_lights(f.scene.get(), &l, 1), LUMICUT_INVALID_ARGUMENT, "a sun has none");
 }
 
 std::vector<lumicut_point> room_points(size_t n) {

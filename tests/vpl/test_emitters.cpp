@@ -76,7 +76,7 @@ TEST(Emitters, DirectVplsGiveTheIrradianceOfADiskOnItsAxis) {
   constexpr int kCount = 20000;
   for (int i = 0; i < kCount; ++i) {
     Rng rng(1, Stage::test, i);
-    const Vpl v = emitters.sample_direct((i + rng.next_float()) / kCount, kCount, rng).vpl;
+    const Vpl v = emitters.sample_direct((i + rng.next_float()) / kCount, kCount, rng);
     const double d2 = length2(v.position), c = v.position.z / std::sqrt(d2);
     EXPECT_LT(v.normal.z, -0.999f);
     irradiance += v.intensity.x * c * c / d2;
@@ -95,8 +95,7 @@ TEST(Emitters, ConstantEnvironmentGivesPiTimesItsRadianceAsIrradiance) {
   double up = 0;
   constexpr int kCount = 50000;
   for (int i = 0; i < kCount; ++i) {
-    Rng rng(1, Stage::test, i);
-    const Vpl v = emitters.sample_direct((i + 0.5) / kCount, kCount, rng).vpl;
+    const Vpl v = emitters.environment_light(i, kCount, 1);
     up += v.intensity.x * std::max(0.0f, -v.normal.z);
   }
   EXPECT_NEAR(up / (kPi * 2), 1.0, 0.02);  // spread of max(0, cos) over the sphere: 0.5 %
@@ -128,11 +127,125 @@ TEST(Emitters, ImageEnvironmentIsSampledWithoutBias) {
   double got = 0;
   constexpr int kCount = 50000;
   for (int i = 0; i < kCount; ++i) {
-    Rng rng(1, Stage::test, i);
-    const Vpl v = emitters.sample_direct((i + 0.5) / kCount, kCount, rng).vpl;
+    const Vpl v = emitters.environment_light(i, kCount, 1);
     got += v.intensity.x * std::max(0.0f, -dot(n, v.normal));
   }
   EXPECT_NEAR(got / expected, 1.0, 0.03);  // uniform side: 0.6 % spread; importance side: 0.5 %
+}
+
+TEST(Emitters, EnvironmentLightsVaryLessThanIndependentDraws) {
+  constexpr uint32_t kW = 64, kH = 32, kLights = 64, kSeeds = 100;
+  std::vector<float> pixels(kW * kH);
+  for (uint32_t y = 0; y < kH; ++y)
+    for (uint32_t x = 0; x < kW; ++x) pixels[y * kW + x] = y < kH / 2 ? 1.0f + 0.02f * x : 0.2f;
+  for (uint32_t x = 20; x < 24; ++x) pixels[5 * kW + x] = 100.0f;  // a bright cloud
+  Scene scene{{}};
+  scene.set_textures({Texture(kW, kH, 1, Texture::Format::float32, {}, pixels.data())});
+  Environment env;
+  env.color = {1, 1, 1}, env.texture = 0;
+  scene.set_environment(env);
+  Progress progress;
+  scene.commit(progress);
+  const Emitters emitters(scene);
+  const Vec3f n{0, 0, 1};
+  const auto irradiance = [&](const Vpl& v) { return v.intensity.x * std::max(0.0f, -dot(n, v.normal)); };
+  double mean[2] = {}, square[2] = {};
+  for (uint32_t seed = 0; seed < kSeeds; ++seed) {
+    double e[2] = {};
+    for (uint64_t i = 0; i < kLights; ++i) {
+      e[0] += irradiance(emitters.environment_light(i, kLights, seed));
+      e[1] += irradiance(emitters.environment_light(0, 1, 1000 + seed * kLights + i)) / kLights;
+    }
+    for (int k = 0; k < 2; ++k) mean[k] += e[k] / kSeeds, square[k] += e[k] * e[k] / kSeeds;
+  }
+  double expected = 0;  // Riemann sum of the upper half
+  for (int i = 0; i < 1000; ++i)
+    for (int j = 0; j < 1000; ++j) {
+      const double elevation = 0.5 * kPi * (i + 0.5) / 1000, phi = 2 * kPi * (j + 0.5) / 1000;
+      const Vec3f d{static_cast<float>(std::cos(elevation) * std::cos(phi)),
+                    static_cast<float>(std::cos(elevation) * std::sin(phi)), static_cast<float>(std::sin(elevation))};
+      expected += scene.environment_radiance(d).x * std::sin(elevation) * std::cos(elevation) * kPi * kPi * 1e-6;
+    }
+  const double stratified = square[0] - mean[0] * mean[0], independent = square[1] - mean[1] * mean[1];
+  EXPECT_NEAR(mean[0] / expected, 1.0, 0.01);
+  EXPECT_NEAR(mean[1] / expected, 1.0, 0.05);
+  EXPECT_LT(stratified, 0.2 * independent);
+}
+
+// A square of n × n quads with a texture whose right half is black.
+std::unique_ptr<Scene> half_black(uint32_t n, bool textured = true) {
+  auto scene = std::make_unique<Scene>(Scene::Config{});
+  constexpr uint32_t kSize = 32;
+  std::vector<float> pixels(kSize * kSize, 0.0f);
+  for (uint32_t y = 0; y < kSize; ++y)
+    for (uint32_t x = 0; x < kSize / 2; ++x) pixels[y * kSize + x] = 4.0f;
+  Texture::Options options;
+  options.clamp = true;
+  scene->set_textures({Texture(kSize, kSize, 1, Texture::Format::float32, options, pixels.data())});
+  Material m;
+  m.emission = {0.5f, 0.5f, 0.5f};
+  m.emission_texture = textured ? 0 : -1;
+  scene->set_materials({m});
+  Mesh mesh;
+  for (uint32_t j = 0; j <= n; ++j)
+    for (uint32_t i = 0; i <= n; ++i) {
+      const float u = static_cast<float>(i) / n, v = static_cast<float>(j) / n;
+      mesh.positions.push_back({2 * u, 2 * v, 0});
+      mesh.uvs.push_back({u, v});
+    }
+  for (uint32_t j = 0; j < n; ++j)
+    for (uint32_t i = 0; i < n; ++i) {
+      const uint32_t a = j * (n + 1) + i, b = a + 1, c = b + n + 1, d = a + n + 1;
+      mesh.indices.insert(mesh.indices.end(), {a, b, c, a, c, d});
+    }
+  scene->add_mesh(mesh);
+  Progress progress;
+  scene->commit(progress);
+  return scene;
+}
+
+TEST(Emitters, TexturedTrianglesHaveThePowerOfTheirOwnPart) {
+  constexpr int kQuads = 64;
+  const auto scene = half_black(kQuads);
+  const Emitters emitters(*scene);
+  // π · area 4 · radiance 2 over half of it: the ramp between bright and black texels is symmetric.
+  EXPECT_NEAR(emitters.power() / (kPi * 4 * 2 * 0.5), 1.0, 1e-6);
+  EXPECT_NEAR(mean_flux(*scene, 20000) / emitters.power(), 1.0, 0.01);
+  constexpr int kLights = 300, kSeeds = 300;
+  const Vec3f below{0.9f, 1.1f, 1.0f};
+  const auto irradiance = [&](const Vec3f& position, double intensity) {
+    const Vec3f d = below - position;
+    return intensity * d.z * d.z / (length2(d) * length2(d));
+  };
+  double mean[2] = {}, square[2] = {};
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    double e[2] = {};
+    for (int i = 0; i < kLights; ++i) {
+      Rng rng(seed, Stage::test, i);
+      const Vpl v = emitters.sample_direct((i + rng.next_float()) / kLights, kLights, rng);
+      EXPECT_LT(v.position.x, 1.0f + 1.0f / 8) << "no light on a black triangle";
+      e[0] += irradiance(v.position, v.intensity.x);
+      // With the mean of the whole image for each triangle all are alike: half of the lights lie on black ones.
+      const int t = static_cast<int>((i + rng.next_float()) / kLights * 2 * kQuads * kQuads);
+      float x = rng.next_float(), y = rng.next_float();
+      if ((y <= x) != (t % 2 == 0)) std::swap(x, y);
+      const Vec3f p{(static_cast<float>(t / 2 % kQuads) + x) * 2 / kQuads,
+                    (static_cast<float>(t / 2 / kQuads) + y) * 2 / kQuads, 0};
+      e[1] += irradiance(p, 0.5 * scene->textures()[0].color(p.x / 2, p.y / 2).x * 4 / kLights);
+    }
+    for (int k = 0; k < 2; ++k) mean[k] += e[k] / kSeeds, square[k] += e[k] * e[k] / kSeeds;
+  }
+  EXPECT_NEAR(mean[0] / mean[1], 1.0, 0.01);
+  EXPECT_LT(square[0] - mean[0] * mean[0], 0.5 * (square[1] - mean[1] * mean[1]));
+}
+
+TEST(Emitters, AMillionEmissiveTrianglesTakeAHundredBytesEach) {
+  const auto scene = half_black(708, false);
+  const Emitters emitters(*scene);
+  const double triangles = 2.0 * 708 * 708;
+  EXPECT_GT(triangles, 1e6);
+  EXPECT_LT(static_cast<double>(emitters.bytes()) / triangles, 100);
+  EXPECT_NEAR(emitters.power() / (kPi * 4 * 0.5), 1.0, 1e-4);
 }
 
 TEST(Emitters, EmissiveTrianglesShineFromTheirFrontUnlessToldOtherwise) {

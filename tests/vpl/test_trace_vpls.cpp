@@ -128,6 +128,39 @@ TEST(TraceVpls, ClosedBoxOfGgxKeepsAlmostAllOfItsAlbedo) {
   EXPECT_LT(flux, series(0.09, -0.005));
 }
 
+TEST(TraceVpls, TheEnvironmentGetsTheLightsItIsGiven) {
+  Scene scene{{}};
+  scene.set_materials({test::diffuse(0.5f, 0.5f, 0.5f)});
+  Mesh mesh;
+  test::add_quad(mesh, {-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, 0);
+  scene.add_mesh(mesh);
+  Light lamp;
+  lamp.type = LightType::rectangle;
+  lamp.position = {0, 0, 2}, lamp.u = {1, 0, 0}, lamp.v = {0, -1, 0}, lamp.value = {10, 10, 10};
+  scene.set_lights({lamp});
+  Environment env;
+  env.color = {3, 3, 3};
+  scene.set_environment(env);
+  Progress progress;
+  scene.commit(progress);
+  const auto environment_lights = [&](uint32_t asked, double& irradiance) {
+    const VplSet set = trace_vpls(scene, {.count = 4000, .environment_count = asked}, progress);
+    EXPECT_NEAR(static_cast<double>(set.lights.size()), 4000, 100);
+    size_t n = 0;
+    irradiance = 0;
+    for (const Vpl& v : set.lights)
+      if (v.kind == VplKind::directional) ++n, irradiance += v.intensity.x * std::max(0.0f, -v.normal.z);
+    return n;
+  };
+  double irradiance;
+  for (const uint32_t asked : {1u, 100u, 1500u}) {
+    EXPECT_EQ(environment_lights(asked, irradiance), asked);
+    if (asked < 100) continue;
+    EXPECT_NEAR(irradiance / (std::numbers::pi * 3), 1.0, 0.01) << asked;
+  }
+  EXPECT_GT(environment_lights(0, irradiance), 400u) << "its share of the direct lights";
+}
+
 TEST(TraceVpls, SameLightsOnOneAndFourThreads) {
   const auto scene = test::make_room();
   std::vector<Vpl> first;

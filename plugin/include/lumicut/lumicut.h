@@ -211,9 +211,22 @@ typedef struct lumicut_light {
   float v[3];
   float spread;       /* rectangle, disk: opening angle, pi (default, also 0) is Lambertian */
   uint32_t spot_cosine; /* 1: intensity also falls with the cosine to the axis (Blender before 4.0) */
+  uint32_t profile;   /* point: 1 + index into the profiles set before the lights, about `direction`; value (in watt: over
+                         4 pi) multiplies its values, and radius is passed over. 0: none */
+  float tangent[3];   /* profile: where its horizontal angle 0 lies, made orthogonal to direction; 0: anywhere */
 } lumicut_light;
 enum { LUMICUT_POINT = 0, LUMICUT_SPOT = 1, LUMICUT_RECTANGLE = 2, LUMICUT_DISK = 3, LUMICUT_SUN = 4 };
 enum { LUMICUT_RADIOMETRIC = 0, LUMICUT_WATT = 1 };
+
+/* Intensity by direction, as photometric files have it: bilinear between its angles, 0 beyond the vertical ones. */
+typedef struct lumicut_profile {
+  uint32_t struct_size;
+  uint32_t vertical_count, horizontal_count; /* at least 2; 1 (the same all around) or at least 2 */
+  uint32_t reserved;
+  const float* vertical;   /* radians from the light's direction, rising within 0..pi */
+  const float* horizontal; /* radians about it, rising from 0 to 2 pi; from tangent towards tangent x direction */
+  const float* values;     /* W/sr, vertical_count for each horizontal angle */
+} lumicut_profile;
 
 typedef struct lumicut_environment {
   uint32_t struct_size;
@@ -257,6 +270,7 @@ LUMICUT_API lumicut_result lumicut_scene_add_mesh(lumicut_scene scene, const lum
 /* New positions of the same topology (and normals, or NULL), new transforms (count as before, or NULL: unchanged). */
 LUMICUT_API lumicut_result lumicut_scene_update_mesh(lumicut_scene scene, uint32_t id, const float* positions, const float* normals, const float* transforms);
 LUMICUT_API lumicut_result lumicut_scene_set_lights(lumicut_scene scene, const lumicut_light* lights, uint64_t count);
+LUMICUT_API lumicut_result lumicut_scene_set_profiles(lumicut_scene scene, const lumicut_profile* profiles, uint64_t count); /* for lights set after; lights keep theirs */
 LUMICUT_API lumicut_result lumicut_scene_set_environment(lumicut_scene scene, const lumicut_environment* environment); /* NULL: black */
 LUMICUT_API lumicut_result lumicut_scene_set_camera(lumicut_scene scene, const lumicut_camera* camera);
 LUMICUT_API lumicut_result lumicut_scene_set_trace(lumicut_scene scene, const lumicut_trace* trace); /* NULL: ours again */
@@ -296,7 +310,8 @@ typedef struct lumicut_vpl {
   float blend;        /* spot: smoothstep over this much of cosine */
   float spot_cosine;  /* spot: 1: times the cosine too */
   float spread_tan;   /* spot: narrowed area lamps fall off with max(0, 1 - spread_tan tan(theta)); 0: no */
-  float reserved;
+  uint32_t profile;   /* spot: name of a profile that a scene of this process was given, in place of this falloff; then blend,
+                         spot_cosine and spread_tan are its tangent, and intensity is that of its largest value; 0: none */
 } lumicut_vpl;
 enum { LUMICUT_VPL_OMNI = 0, LUMICUT_VPL_ORIENTED = 1, LUMICUT_VPL_DIRECTIONAL = 2, LUMICUT_VPL_SPOT = 3 };
 

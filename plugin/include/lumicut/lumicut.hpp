@@ -134,6 +134,9 @@ class Scene : public Handle<lumicut_scene> {
     check(lumicut_scene_update_mesh(get(), id, positions, normals, transforms));
   }
   void set_lights(const std::vector<lumicut_light>& l) { check(lumicut_scene_set_lights(get(), l.data(), l.size())); }
+  void set_profiles(const std::vector<lumicut_profile>& p) {
+    check(lumicut_scene_set_profiles(get(), p.data(), p.size()));
+  }
   void set_environment(const lumicut_environment& e) { check(lumicut_scene_set_environment(get(), &e)); }
   void clear_environment() { check(lumicut_scene_set_environment(get(), nullptr)); }
   void set_camera(const lumicut_camera& camera) { check(lumicut_scene_set_camera(get(), &camera)); }

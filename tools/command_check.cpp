@@ -1,0 +1,123 @@
+// lumicut check: what a scene holds, what is approximated or looks wrong in it, and what rendering it will cost.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "io/library.h"
+#include "io/scene_json.h"
+#include "io/scene_upload.h"
+#include "tools/commands.h"
+#include "tools/forecast.h"
+#include "tools/interrupt_watcher.h"
+#include "tools/preflight.h"
+#include "tools/progress_bar.h"
+#include "tools/render_setup.h"
+
+namespace lumicut::tools {
+
+using nlohmann::ordered_json;
+
+namespace {
+
+struct Options : RenderSetup {
+  Options() { integrator = "lightcuts"; }
+  std::string scene, size;
+  uint32_t samples = 0;
+  bool json = false, strict = false, no_forecast = false, quiet = false;
+};
+
+double bytes_of(const io::SceneData& data) {
+  double bytes = 0;
+  for (const auto& t : data.textures) bytes += static_cast<double>(t.bytes.size() + 4 * t.floats.size());
+  for (const auto& m : data.meshes)
+    bytes += 4.0 * static_cast<double>(m.positions.size() + m.normals.size() + m.uvs.size() + m.indices.size() +
+                                       m.materials.size() + m.transforms.size());
+  return bytes;
+}
+
+void check_scene(const Options& o) {
+  const io::Library library;
+  const io::Api& api = library.api();
+  ProgressBar bar(o.quiet || o.json);
+  io::Handle<lumicut_device> device(api);
+  io::Handle<lumicut_scene> scene(api);
+  io::Handle<lumicut_integrator> integrator(api);
+  InterruptWatcher watcher(api);  // ends before the handles that it may cancel
+  lumicut_device_desc device_desc{};
+  device_desc.struct_size = sizeof(device_desc);
+  device_desc.abi_major = LUMICUT_ABI_MAJOR;
+  device_desc.threads = o.threads;
+  io::check(api, api.device_create(&device_desc, device.out()), "device");
+  create_scene(api, o, device.get(), scene);
+  create_integrator(api, o, device.get(), integrator);
+  const auto size = o.size.empty() ? std::vector<uint32_t>{} : numbers(o.size, 'x', 2, "--size");
+
+  bar.show("reading files", 0, 0);
+  const io::SceneData data = io::read_scene(o.scene);
+  stop_if_interrupted();
+  io::upload_scene(api, scene.get(), data);
+  lumicut_render_desc desc{};
+  desc.struct_size = sizeof(desc);
+  desc.width = size.empty() ? data.width : size[0];
+  desc.height = size.empty() ? data.height : size[1];
+  desc.samples = o.samples > 0 ? o.samples : data.samples;
+  bar.show("acceleration structure", 0, 0);
+  watcher.watch(scene.get());
+  const lumicut_result committed = api.scene_commit(scene.get());
+  watcher.watch(nullptr);
+  stop_if_interrupted();
+  io::check(api, committed, o.scene);
+  // Before the examination, whose own memory is not the render's.
+  std::optional<Forecast> cost;
+  if (!o.no_forecast) {
+    bar.show("probe", 0, 0);
+    cost = forecast(api, o, scene.get(), integrator.get(), desc, bytes_of(data), [&](void* h) { watcher.watch(h); });
+  }
+  bar.show("examination", 0, 0);
+  const Preflight found =
+      preflight(api, device.get(), data, preflight_options(api, integrator.get(), desc.width, desc.height));
+  stop_if_interrupted();
+  bar.wipe();
+  if (o.json) {
+    ordered_json all = {{"scene", o.scene}, {"version", api.version(nullptr, nullptr)}};
+    all.update(preflight_json(found));
+    all["forecast"] = nullptr;
+    if (cost) {
+      all["forecast"] = forecast_json(*cost);
+      all["forecast"]["integrator"] = o.integrator, all["forecast"]["width"] = desc.width;
+      all["forecast"]["height"] = desc.height, all["forecast"]["samples"] = desc.samples;
+    }
+    fmt::print("{}\n", all.dump(2));
+  } else {
+    fmt::print("{}\n", o.scene);
+    for (const auto& line : preflight_lines(found)) fmt::print("  {}\n", line);
+    if (cost)
+      fmt::print("  {}x{}, {} samples, {}: {}\n", desc.width, desc.height, desc.samples, o.integrator,
+                 forecast_line(*cost));
+    if (found.suspicious.empty()) fmt::print("  nothing suspicious\n");
+  }
+  if (o.strict && !found.suspicious.empty()) throw SilentExit(kFailed);
+}
+
+}  // namespace
+
+void add_check(CLI::App& app) {
+  auto* command =
+      app.add_subcommand("check", "What a scene holds, what looks wrong in it, what rendering it will cost");
+  const auto o = std::make_shared<Options>();
+  command->add_option("scene", o->scene, "Scene, JSON: docs/scene_format.md")->required();
+  add_setup_options(*command, *o);
+  command->add_option("--size", o->size, "WIDTHxHEIGHT in pixels (default: the scene's)");
+  command->add_option("--spp", o->samples, "Samples a pixel (default: the scene's)")->check(CLI::Range(1, 65536));
+  command->add_flag("--no-forecast", o->no_forecast, "Render nothing: no forecast of time and memory");
+  command->add_flag("--json", o->json, "Print JSON instead of text");
+  command->add_flag("--strict", o->strict, "Exit code 1 where anything is suspicious");
+  command->add_flag("-q,--quiet", o->quiet, "No progress bar");
+  command->callback([o] {
+    catch_interrupts();
+    check_scene(*o);
+  });
+}
+
+}  // namespace lumicut::tools

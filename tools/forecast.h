@@ -1,0 +1,29 @@
+// How long a render will take and how much memory: prepared at the true settings, rendered in a few squares, scaled.
+#pragma once
+
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "io/library.h"
+#include "tools/render_setup.h"
+
+namespace lumicut::tools {
+
+struct Forecast {
+  double seconds = 0;          // of `lumicut render`: lights, trees and image, with the threads of the device
+  double prepare_seconds = 0;  // of these: lights and trees, as measured
+  double cpu_seconds = 0;      // of all threads together
+  double rays_per_pixel = 0;   // shadow rays
+  double peak_bytes = 0;       // of the whole process
+  double probed_pixels = 0, pixels = 0, vpls = 0;
+};
+
+// `watch` is told what works now, nullptr at the end: for Ctrl-C. `held_bytes`: what the caller keeps in memory and
+// `lumicut render` does not.
+Forecast forecast(const io::Api& api, const RenderSetup& setup, lumicut_scene scene, lumicut_integrator integrator,
+                  const lumicut_render_desc& desc, double held_bytes, const std::function<void(void*)>& watch);
+
+std::string forecast_line(const Forecast& f);
+nlohmann::ordered_json forecast_json(const Forecast& f);
+
+}  // namespace lumicut::tools
