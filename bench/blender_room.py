@@ -4,9 +4,13 @@
     blender -b room.blend --addons lumicut_blender -P bench/blender_room.py -- table --folder room_reference
 
 `reference` renders Cycles without clamping, a part a seed, and keeps what was rendered before. `table` takes the mean of
-the parts. room.blend comes from export_scripts/scenes/blender_indirect_room.py. CPU seconds are the process' own.
+the parts; `one` tries settings; `again` measures the images of both once more, against more parts; `bias` asks where the
+missing energy went (means over the image: few samples do). room.blend comes from
+export_scripts/scenes/blender_indirect_room.py. CPU seconds are the process' own.
 """
 import argparse
+import contextlib
+import json
 import os
 import pathlib
 import sys
@@ -19,13 +23,14 @@ import numpy as np  # noqa: E402
 
 import helpers as h  # noqa: E402
 
-# What is tried for each budget: the clamp shrinks and lights grow with time.
+# What is tried for each budget at 320x240: the clamp shrinks and lights grow with time.
 SETTINGS = {
-    1: [("stochastic_lightcuts", 1, {"vpls": 3000, "lights": 16})],
-    5: [("illumination_cut", 4, {"vpls": 60000, "error": 0.03, "clamp_relative": 0.03})],
-    20: [("illumination_cut", 8, {"vpls": 300000, "error": 0.015, "clamp_relative": 0.015})],
+    1: [("stochastic_lightcuts", 1, {"vpls": 1500, "lights": 6})],
+    5: [("illumination_cut", 2, {"vpls": 60000, "error": 0.03, "clamp_relative": 0.03})],
+    20: [("illumination_cut", 7, {"vpls": 300000, "error": 0.015, "clamp_relative": 0.015})],
     60: [("illumination_cut", 16, {"vpls": 800000, "error": 0.01, "clamp_relative": 0.008})],
 }
+CLAMPS = (0.03, 0.003)  # `bias`: what is lost as the clamp shrinks
 
 
 def measured(configure):
@@ -40,8 +45,10 @@ def measured(configure):
 class Reference:
     """The mean of independent parts. Its own noise, known from how they differ, is taken off the errors in quadrature."""
 
-    def __init__(self, parts):
-        self.parts, self.image = parts, np.mean(parts, 0)
+    def __init__(self, folder):
+        self.folder = folder
+        self.parts = [np.load(p) for p in sorted(folder.glob("*.npy"))]
+        self.image = np.mean(self.parts, 0)
 
     def error(self, image, side=1):
         """(RMSE / mean, noise of the reference / mean) of blocks of pixels: in large ones noise averages out, bias stays."""
@@ -49,7 +56,11 @@ class Reference:
         noise2 = np.mean([((h.blocks(p, side) - b) ** 2).mean() for p in self.parts]) / max(1, len(self.parts) - 1)
         return float(np.sqrt(max(0.0, ((a - b) ** 2).mean() - noise2)) / b.mean()), float(np.sqrt(noise2) / b.mean())
 
-    def row(self, name, image, cpu):
+    def row(self, name, image, cpu, keep=True):
+        if keep:  # for `again`, with a longer reference
+            (self.folder / "rows").mkdir(exist_ok=True)
+            number = len(list((self.folder / "rows").glob("*.npz")))
+            np.savez_compressed(self.folder / "rows" / f"{number:03}.npz", image=image.astype(np.float32), name=name, cpu=cpu)
         pixel, block = self.error(image)[0], self.error(image, 8)[0]
         print(f"| {name} | {cpu:.1f} | {100 * pixel:.1f} % | {100 * block:.1f} % | "
               f"{100 * (image.mean() / self.image.mean() - 1):+.1f} % |", flush=True)
@@ -65,17 +76,90 @@ def small(width):
     bpy.context.scene.render.resolution_x, bpy.context.scene.render.resolution_y = width, width * 3 // 4
 
 
+class Floor:
+    """The floor's nodes: a share of gloss, which may be hidden from what lies one bounce from the camera."""
+
+    def __init__(self):
+        self.tree = bpy.data.materials["floor"].node_tree
+        self.mix, self.coat = (next(n for n in self.tree.nodes if n.type == kind) for kind in ("MIX_SHADER", "BSDF_GLOSSY"))
+        self.share = self.mix.inputs[0].default_value
+
+    def set_gloss(self, on):
+        self.mix.inputs[0].default_value = self.share if on else 0.0
+
+    @contextlib.contextmanager
+    def dark_at_the_first_bounce(self):
+        """For Cycles: what the floor's gloss throws straight at a point that the camera sees is lost, all else is kept.
+
+        This is what a virtual light without a lobe loses.
+        """
+        path, equal, less = (self.tree.nodes.new(kind) for kind in ("ShaderNodeLightPath", "ShaderNodeMath", "ShaderNodeMath"))
+        equal.operation, less.operation = "COMPARE", "SUBTRACT"
+        equal.inputs[1].default_value, equal.inputs[2].default_value, less.inputs[0].default_value = 1.0, 0.5, 1.0
+        for a, b in ((path.outputs["Ray Depth"], equal.inputs[0]), (equal.outputs[0], less.inputs[1]),
+                     (less.outputs[0], self.coat.inputs["Color"])):
+            self.tree.links.new(a, b)
+        yield
+        for node in (path, equal, less):
+            self.tree.nodes.remove(node)
+
+
+def bias(options):
+    """Means over the image, each with its standard error from independent parts (and kept in a file)."""
+    store = options.folder / "bias.json"
+    means = json.loads(store.read_text()) if store.exists() else {}
+    floor = Floor()
+
+    def mean(name, configure):
+        found = means.setdefault(name, [])
+        for part in range(len(found), options.parts):
+            image, cpu, _ = measured(lambda: configure(part))
+            found.append(float(image.mean()))
+            store.write_text(json.dumps(means))
+            print(f"{name}, part {part}: {found[-1]:.6f}, {cpu:.0f} CPU s", flush=True)
+        found = np.array(found[:options.parts])
+        return found.mean(), found.std(ddof=1) / np.sqrt(len(found))
+
+    rows = {}
+    for gloss in (True, False):
+        floor.set_gloss(gloss)
+        name = "gloss" if gloss else "no gloss"
+        rows[name, "cycles"] = mean(f"{name}: Cycles", lambda part: cycles(options.samples, 500 + part))
+        if gloss:
+            with floor.dark_at_the_first_bounce():
+                rows[name, "dark"] = mean(f"{name}: Cycles, dark at the first bounce", lambda part: cycles(options.samples, 900 + part))
+        for clamp in CLAMPS:
+            rows[name, clamp] = mean(f"{name}: Lumicut, clamp {clamp:g}", lambda part: h.set_lumicut(
+                "stochastic_lightcuts", 2, vpls=100000, lights=48, clamp_relative=clamp, seed=1 + part))
+    floor.set_gloss(True)
+    print("| | floor with gloss | floor without |\n|---|---|---|")
+    for key in ("dark", *CLAMPS):
+        cells = []
+        for name in ("gloss", "no gloss"):
+            if (name, key) in rows:
+                (a, da), (b, db) = rows[name, key], rows[name, "cycles"]
+                cells.append(f"{100 * (a / b - 1):+.2f} ± {100 * np.hypot(da / b, a * db / b ** 2):.2f} %")
+            else:
+                cells.append("")
+        label = "Cycles, the floor's gloss dark one bounce from the camera" if key == "dark" else f"Lumicut, clamp_relative={key:g}"
+        print(f"| {label} | {' | '.join(cells)} |")
+
+
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("mode", choices=["reference", "table", "one"])
+    parser.add_argument("mode", choices=["reference", "table", "one", "again", "bias"])
     parser.add_argument("--folder", type=pathlib.Path, required=True)
     parser.add_argument("--parts", type=int, default=4)
     parser.add_argument("--samples", type=int, default=1024)
     parser.add_argument("--width", type=int, default=320)
-    parser.add_argument("--lumicut", default="", help="one: integrator,samples,name=value,...")
+    parser.add_argument("--lumicut", nargs="*", default=[], metavar="INTEGRATOR,SAMPLES,NAME=VALUE,...", help="one: settings to try")
+    parser.add_argument("--budgets", type=int, nargs="*", default=list(SETTINGS), help="table: CPU seconds")
     options = parser.parse_args(sys.argv[sys.argv.index("--") + 1:])
     small(options.width)
     options.folder.mkdir(exist_ok=True)
+    if options.mode == "bias":
+        bias(options)
+        return
     if options.mode == "reference":
         for part in range(options.parts):
             path = options.folder / f"{options.samples}_{part}.npy"
@@ -85,9 +169,16 @@ def main():
             np.save(path, image)
             print(f"part {part}: {cpu:.0f} CPU s, {wall:.0f} s", flush=True)
         return
-    reference = Reference([np.load(p) for p in sorted(options.folder.glob("*.npy"))])
+    reference = Reference(options.folder)
     _, noise = reference.error(reference.image)
     print(f"reference: {len(reference.parts)} parts, its own noise {100 * noise:.1f} % RMSE/mean")
+
+    print("| | CPU s | RMSE/mean | of 8x8 blocks | mean |\n|---|---|---|---|---|")
+    if options.mode == "again":
+        for path in sorted((options.folder / "rows").glob("*.npz")):
+            with np.load(path) as row:
+                reference.row(str(row["name"]), row["image"].astype(np.float64), float(row["cpu"]), keep=False)
+        return
 
     def lumicut(integrator, samples, values):
         image, cpu, wall = measured(lambda: h.set_lumicut(integrator, samples, **values))
@@ -96,18 +187,18 @@ def main():
         return cpu
 
     if options.mode == "one":
-        integrator, samples, *pairs = options.lumicut.split(",")
-        values = {k: (int if k in {"vpls", "lights", "max_depth"} else float)(v) for k, v in (p.split("=") for p in pairs)}
-        lumicut(integrator, int(samples), values)
+        for text in options.lumicut:
+            integrator, samples, *pairs = text.split(",")
+            values = {k: (int if k in {"vpls", "lights", "max_depth"} else float)(v) for k, v in (p.split("=") for p in pairs)}
+            lumicut(integrator, int(samples), values)
         return
     measured(lambda: cycles(1))  # loads and compiles what it needs
     _, low, _ = measured(lambda: cycles(1))
     _, high, _ = measured(lambda: cycles(17))
     rate, fixed = (high - low) / 16, low - (high - low) / 16
     print(f"Cycles: {fixed:.2f} CPU s and {rate:.3f} a sample")
-    print("| | CPU s | RMSE/mean | of 8x8 blocks | mean |\n|---|---|---|---|---|")
-    for budget, rows in SETTINGS.items():
-        spent = max(lumicut(*row) for row in rows)
+    for budget in options.budgets:
+        spent = max(lumicut(*row) for row in SETTINGS[budget])
         samples = max(1, round((spent - fixed) / rate))
         for clamp in (0.0, 10.0):
             image, cpu, _ = measured(lambda: cycles(samples, 1, clamp))

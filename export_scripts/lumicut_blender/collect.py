@@ -75,10 +75,11 @@ def normals_of(mesh, corners):
 
 
 class MeshReader:
-    """One evaluated mesh to arrays. `materials`: the numbers of its slots, in order."""
+    """One evaluated mesh to arrays. `numbers`: the materials of its slots, in order. `check` raises to stop."""
 
-    def __init__(self, name, mesh, numbers, materials, report):
+    def __init__(self, name, mesh, numbers, materials, report, check=lambda: None):
         self.name, self.mesh, self.numbers, self.materials, self.report = name, mesh, numbers, materials, report
+        self.check = check
 
     def read(self):
         """scene_data.Mesh without instances, or None for one without faces."""
@@ -88,10 +89,15 @@ class MeshReader:
         if triangles == 0:
             return None
         loops = len(mesh.loops)
+        self.check()
         corners = corner_vertices(mesh, loops)
+        self.check()
         tri_corners = fetch(mesh.loop_triangles, "loops", triangles, 3, np.int32)
+        self.check()
         positions = vertex_positions(mesh)
+        self.check()
         kind, normals = normals_of(mesh, corners)
+        self.check()
         slot_of_triangle = self._slots(triangles)
         numbers = np.array(self.numbers, np.uint32)
         used = np.unique(slot_of_triangle) if slot_of_triangle is not None else np.array([0])
@@ -101,10 +107,12 @@ class MeshReader:
         else:
             out.materials = numbers[slot_of_triangle]
         uvs = self._uvs(loops, corners, positions, tri_corners, slot_of_triangle, used)
+        self.check()
         bad = ~np.isfinite(positions).all(1)
         if bad.any():
             self.report.note(self.name, "Vertices that are not finite, moved to the origin")
             positions[bad] = 0
+        self.check()
         if uvs is None and kind != "corner":
             out.indices = corners[tri_corners]
             out.normals = normals
@@ -186,7 +194,7 @@ class Collector:
         """`check` is called between meshes and instances and raises to stop."""
         self.depsgraph, self.check, self.cache = depsgraph, check, cache
         self.report = report if report is not None else Report()
-        self.materials = Materials(self.report, max_shininess, images)
+        self.materials = Materials(self.report, max_shininess, images, check)
         self.scene = SceneData()
         self._meshes = {}
         self.instances = 0
@@ -265,14 +273,14 @@ class Collector:
 
     def _read(self, ob, mesh, slots, numbers):
         if self.cache is None:
-            return MeshReader(ob.name, mesh, numbers, self.materials, self.report).read()
+            return MeshReader(ob.name, mesh, numbers, self.materials, self.report, self.check).read()
         # Evaluated data move in memory; the originals' names say what they came from.
         mappings = tuple(self.materials.converted[n].mapping if self.materials.converted[n].pictures else None for n in numbers)
         names = frozenset({ob.name_full, mesh.name_full})
         key = (mesh.as_pointer(), mappings, names, tuple(numbers), len(mesh.vertices), len(mesh.loops))
         found = self.cache.meshes.get(key)
         if found is None:
-            found = MeshReader(ob.name, mesh, numbers, self.materials, self.report).read()
+            found = MeshReader(ob.name, mesh, numbers, self.materials, self.report, self.check).read()
             if found is None:
                 return None
             self.cache.meshes[key] = found

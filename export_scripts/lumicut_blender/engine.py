@@ -11,6 +11,7 @@ from . import collect, export, library, properties, runtime, viewport
 from .report import Report
 
 POLL_MS = 40
+SHOW_SECONDS = 0.25  # between two changes of what is shown: each redraws the window, and a window that draws hears no key
 FLAT_RECTS = bpy.app.version >= (4, 1, 0)
 NO_DEPTH = 1e10  # as Cycles has it where nothing is hit
 export_requests = []  # folders that the next render writes a scene to, in place of rendering
@@ -57,10 +58,10 @@ class Watched:
         stopped = False
         while thread.is_alive():
             thread.join(POLL_MS / 1000)
-            if not stopped and self.engine.test_break():
+            if not stopped and self.engine.is_stopped():
                 stopped = True
                 handle.cancel()
-            self.engine.update_stats("Lumicut", phase)
+            self.engine.say(phase)
         if failure and not isinstance(failure[0], library.Cancelled):
             raise failure[0]
         if stopped or failure:
@@ -91,8 +92,27 @@ class LumicutEngine(bpy.types.RenderEngine):
             traceback.print_exc()
             self.report({"ERROR"}, f"Lumicut: a defect of the add-on: {type(error).__name__}: {error}")
 
+    # Blender's own functions cannot be overridden; these two can, and tests do.
+
+    def is_stopped(self):
+        """Whether the user wants no more of it: asked at least every 40 ms, in every phase."""
+        return self.test_break()
+
+    def say(self, phase, fraction=None):
+        """The phase's name, and how far it is. Called at every poll; shown when the phase is new, or after a while."""
+        now, shown = time.perf_counter(), getattr(self, "_shown", None)
+        if shown is not None and shown[0] == phase and (fraction is None or now < shown[1] + SHOW_SECONDS):
+            return
+        self._shown = phase, now
+        if fraction is None:
+            self.update_stats("Lumicut", phase)
+            return
+        self.update_stats("Lumicut", f"{phase} {100 * fraction:.0f} %" if phase else "")
+        # Preparing has several phases, which count from 0 each: it gets the first fifth together.
+        self.update_progress(0.2 + 0.8 * fraction if phase == "render" else 0.2 * fraction)
+
     def _check(self):
-        if self.test_break():
+        if self.is_stopped():
             raise collect.Cancelled
 
     def _render(self, depsgraph):
@@ -100,7 +120,7 @@ class LumicutEngine(bpy.types.RenderEngine):
         scene = depsgraph.scene_eval
         settings = depsgraph.scene.lumicut
         started = time.perf_counter()
-        self.update_stats("Lumicut", "collecting the scene")
+        self.say("collecting the scene")
         report = Report()
         data = collect.Collector(depsgraph, report, self._check, max_shininess=settings.max_shininess).collect()
         camera = self.camera_override or scene.camera
@@ -164,28 +184,25 @@ class LumicutEngine(bpy.types.RenderEngine):
         """Polls until the frame is done; hands tiles over as they finish."""
         passes = self._pass_list(depsgraph)
         show_tiles = not bpy.app.background
-        stopped = None
+        stopped, tiles_shown = False, 0.0
         while True:
             try:
                 status = render.wait(POLL_MS)
             except library.Cancelled:
                 raise Stopped from None
-            if stopped is None and self.test_break():
-                stopped = time.perf_counter()
+            if not stopped and self.is_stopped():
+                stopped = True
                 render.cancel()
                 continue
-            phase = (status.phase or b"").decode()
-            rendering = phase == "render"
-            self.update_stats("Lumicut", f"{phase} {100 * status.fraction:.0f} %" if phase else "")
-            # Preparing has several phases, which count from 0 each: it gets the first fifth together.
-            self.update_progress(0.2 + 0.8 * status.fraction if rendering else 0.2 * status.fraction)
+            self.say((status.phase or b"").decode(), status.fraction)
             if status.state != library.RUNNING:
                 break
-            if show_tiles and stopped is None:
-                deadline = time.perf_counter() + 0.1
-                while time.perf_counter() < deadline and (tile := render.next_tile()) is not None:
+            if show_tiles and not stopped and time.perf_counter() > tiles_shown + SHOW_SECONDS:
+                tiles_shown = time.perf_counter()
+                deadline = tiles_shown + 0.1
+                while time.perf_counter() < deadline and not self.is_stopped() and (tile := render.next_tile()) is not None:
                     self._write(render, depsgraph, passes, crop, tile, height)
-        if self.test_break():
+        if self.is_stopped():
             raise Stopped
         self._write(render, depsgraph, passes, crop, crop, height)
         self.update_progress(1.0)

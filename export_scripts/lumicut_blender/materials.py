@@ -261,9 +261,9 @@ SLOTS = ("diffuse", "specular", "emission", "opacity")
 class Materials:
     """Numbers materials and images of one scene, converting each once."""
 
-    def __init__(self, report, max_shininess=1000.0, images=None):
+    def __init__(self, report, max_shininess=1000.0, images=None, check=lambda: None):
         self.report, self.max_shininess = report, max_shininess
-        self.images = images or Images(report)
+        self.images = images or Images(report, check)
         self.converted, self.pictures = [], []
         self._numbers, self._picture_numbers = {}, {}
 

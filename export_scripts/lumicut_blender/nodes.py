@@ -83,11 +83,17 @@ class Value:
 ZERO, ONE = Value(0), Value(1)
 
 
-class Images:
-    """Texels of Blender's images, read once: packed, generated, byte and float alike."""
+SLAB = 1 << 22  # numbers between two looks at the stop button
 
-    def __init__(self, report):
-        self.report = report
+
+class Images:
+    """Texels of Blender's images, read once: packed, generated, byte and float alike.
+
+    `check` is called between steps of what takes long, and raises to stop.
+    """
+
+    def __init__(self, report, check=lambda: None):
+        self.report, self.check = report, check
         self._read = {}
 
     def pixels(self, image):
@@ -96,6 +102,7 @@ class Images:
             return self._read[image.name_full]
         width, height = image.size
         result = None
+        self.check()
         if width > 0 and height > 0 and image.channels > 0:
             flat = np.empty(width * height * image.channels, np.float32)
             try:
@@ -110,7 +117,7 @@ class Images:
                 if image.is_float:
                     texels = np.ascontiguousarray(np.nan_to_num(texels, nan=0, posinf=65504, neginf=0))
                 else:
-                    texels = np.rint(np.clip(texels, 0, 1) * 255).astype(np.uint8)
+                    texels = self._bytes(texels)
                     space = image.colorspace_settings.name
                     srgb = space not in LINEAR_SPACES
                     if srgb and space != "sRGB":
@@ -124,6 +131,14 @@ class Images:
             self.report.note(f"{image.name} ({image.source.lower()})", "Images of which the first picture or tile is used")
         self._read[image.name_full] = result
         return result
+
+    def _bytes(self, texels):
+        out = np.empty(texels.shape, np.uint8)
+        rows = max(1, SLAB // (texels.shape[1] * texels.shape[2]))
+        for row in range(0, len(texels), rows):
+            self.check()
+            out[row:row + rows] = np.rint(np.clip(texels[row:row + rows], 0, 1) * 255)
+        return out
 
 
 def input_of(node, *names):
@@ -239,6 +254,7 @@ class Evaluator:
         node, output, stack = self.source(socket, stack)
         if node is None:
             return self.constant(output)
+        self.images.check()
         return self.node_value(node, output, stack)
 
     @staticmethod

@@ -27,7 +27,7 @@ class Mesh:
     transforms: list = dataclasses.field(default_factory=list)  # 3x4 each, one an instance
 
 
-def baked(mesh):
+def baked(mesh, check=lambda: None):
     """(positions, normals, indices) of a mesh with one instance, in the world: no tree of trees for what stands alone.
 
     In double precision, as io/scene_json.cpp has it, so that an exported scene is the same one.
@@ -36,13 +36,17 @@ def baked(mesh):
     p = mesh.positions.astype(np.float64)
     positions = np.stack([m[r, 0] * p[:, 0] + m[r, 1] * p[:, 1] + m[r, 2] * p[:, 2] + m[r, 3] for r in range(3)], 1)
     c = m[:, 0], m[:, 1], m[:, 2]
+    check()
     determinant = np.cross(c[0], c[1]) @ c[2]
     sign = -1.0 if determinant < 0 else 1.0
     normals, indices = mesh.normals, mesh.indices
     if normals is not None:  # by the cofactors: the inverse transpose up to the determinant
         n = normals.astype(np.float64)
+        check()
         turned = sum(np.outer(n[:, k], np.cross(c[(k + 1) % 3], c[(k + 2) % 3]) * sign) for k in range(3))
+        check()
         length = np.linalg.norm(turned, axis=1)
+        check()
         normals = np.where((length > 0)[:, None], turned / np.where(length > 0, length, 1)[:, None], n).astype(np.float32)
     if determinant < 0:
         indices = indices[:, [0, 2, 1]]
@@ -74,7 +78,8 @@ class SceneData:
         for mesh in self.meshes:
             check()
             if len(mesh.transforms) == 1:
-                positions, normals, indices = baked(mesh)
+                positions, normals, indices = baked(mesh, check)
+                check()
                 scene.add_mesh(positions, indices, normals, mesh.uvs, mesh.materials, mesh.material)
             else:
                 scene.add_mesh(mesh.positions, mesh.indices, mesh.normals, mesh.uvs, mesh.materials, mesh.material,

