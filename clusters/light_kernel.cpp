@@ -10,9 +10,23 @@ HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-template <VplKind kKind, bool kGlossy>
+// Twin of mean_cosine.
+HWY_INLINE V MeanCosine(D d, const Vec3f& normal, const DirectionScatter& s, const V3& to_light) {
+  const V c = hn::Neg(Dot(Set3(d, normal), to_light));
+  const V diagonal = hn::MulAdd(hn::Mul(to_light.x, to_light.x), hn::Set(d, s.xx),
+                                hn::MulAdd(hn::Mul(to_light.y, to_light.y), hn::Set(d, s.yy),
+                                           hn::Mul(hn::Mul(to_light.z, to_light.z), hn::Set(d, s.zz))));
+  const V mixed = hn::MulAdd(hn::Mul(to_light.x, to_light.y), hn::Set(d, s.xy),
+                             hn::MulAdd(hn::Mul(to_light.x, to_light.z), hn::Set(d, s.xz),
+                                        hn::Mul(hn::Mul(to_light.y, to_light.z), hn::Set(d, s.yz))));
+  const V scatter = hn::Max(hn::Zero(d), hn::MulAdd(hn::Set(d, 2.0f), mixed, diagonal));
+  return hn::Mul(hn::Set(d, 0.5f), hn::Add(c, hn::Sqrt(hn::MulAdd(c, c, scatter))));
+}
+
+template <VplKind kKind, bool kGlossy, bool kScatter = false>
 HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
-                        size_t count, LitPoints& lit, const uint16_t* wanted) {
+                        size_t count, LitPoints& lit, const uint16_t* wanted,
+                        const DirectionScatter* scatter = nullptr) {
   const D d;
   const size_t lanes = hn::Lanes(d);
   const V zero = hn::Zero(d);
@@ -28,7 +42,9 @@ HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, co
     }
     const V3 position = Load3(d, points.position, p);
     V3 to_light;
-    const V geometry = Geometry<kKind>(d, light, clamp2, position, Load3(d, points.normal, p), to_light);
+    V geometry = Geometry < kScatter ? VplKind::omni
+                                     : kKind > (d, light, clamp2, position, Load3(d, points.normal, p), to_light);
+    if constexpr (kScatter) geometry = hn::Mul(geometry, MeanCosine(d, light.normal, *scatter, to_light));
     const auto reached = hn::And(hn::Gt(geometry, zero), inside);
     if (hn::AllFalse(d, reached)) continue;
     const V3 f = Reflectance<kGlossy>(d, points, p, to_light);
@@ -60,7 +76,12 @@ HWY_INLINE size_t LightKind(const Vpl& light, const Rgb& intensity, float clamp2
 }
 
 size_t LightPoints(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
-                   size_t count, LitPoints& lit, const uint16_t* wanted) {
+                   size_t count, LitPoints& lit, const uint16_t* wanted, const DirectionScatter* scatter) {
+  if (scatter != nullptr)
+    return points.glossy() ? Light<VplKind::oriented, true, true>(light, intensity, clamp2, points, first, count, lit,
+                                                                  wanted, scatter)
+                           : Light<VplKind::oriented, false, true>(light, intensity, clamp2, points, first, count, lit,
+                                                                   wanted, scatter);
   switch (light.kind) {
     case VplKind::omni:
       return LightKind<VplKind::omni>(light, intensity, clamp2, points, first, count, lit, wanted);
@@ -82,8 +103,8 @@ namespace lumicut {
 HWY_EXPORT(LightPoints);
 
 void light_points(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
-                  size_t count, LitPoints& lit, const uint16_t* lanes) {
-  lit.count = HWY_DYNAMIC_DISPATCH(LightPoints)(light, intensity, clamp2, points, first, count, lit, lanes);
+                  size_t count, LitPoints& lit, const uint16_t* lanes, const DirectionScatter* scatter) {
+  lit.count = HWY_DYNAMIC_DISPATCH(LightPoints)(light, intensity, clamp2, points, first, count, lit, lanes, scatter);
 }
 
 Rgb light_point(const Vpl& light, const Rgb& intensity, float clamp2, const SurfacePoint& point) {
