@@ -12,9 +12,23 @@ HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-template <VplKind kKind, Lobes kLobes>
+// Twin of mean_cosine.
+HWY_INLINE V MeanCosine(D d, const Vec3f& normal, const DirectionScatter& s, const V3& to_light) {
+  const V c = hn::Neg(Dot(Set3(d, normal), to_light));
+  const V diagonal = hn::MulAdd(hn::Mul(to_light.x, to_light.x), hn::Set(d, s.xx),
+                                hn::MulAdd(hn::Mul(to_light.y, to_light.y), hn::Set(d, s.yy),
+                                           hn::Mul(hn::Mul(to_light.z, to_light.z), hn::Set(d, s.zz))));
+  const V mixed = hn::MulAdd(hn::Mul(to_light.x, to_light.y), hn::Set(d, s.xy),
+                             hn::MulAdd(hn::Mul(to_light.x, to_light.z), hn::Set(d, s.xz),
+                                        hn::Mul(hn::Mul(to_light.y, to_light.z), hn::Set(d, s.yz))));
+  const V scatter = hn::Max(hn::Zero(d), hn::MulAdd(hn::Set(d, 2.0f), mixed, diagonal));
+  return hn::Mul(hn::Set(d, 0.5f), hn::Add(c, hn::Sqrt(hn::MulAdd(c, c, scatter))));
+}
+
+template <VplKind kKind, Lobes kLobes, bool kScatter = false>
 HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
-                        size_t count, LitPoints& lit, const uint16_t* wanted) {
+                        size_t count, LitPoints& lit, const uint16_t* wanted,
+                        const DirectionScatter* scatter = nullptr) {
   const D d;
   const size_t lanes = hn::Lanes(d);
   const V zero = hn::Zero(d);
@@ -30,7 +44,9 @@ HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, co
     }
     const V3 position = Load3(d, points.position, p), normal = Load3(d, points.normal, p);
     V3 to_light;
-    const V geometry = Geometry<kKind>(d, light, clamp2, position, normal, to_light);
+    constexpr VplKind kShape = kScatter ? VplKind::omni : kKind;
+    V geometry = Geometry<kShape>(d, light, clamp2, position, normal, to_light);
+    if constexpr (kScatter) geometry = hn::Mul(geometry, MeanCosine(d, light.normal, *scatter, to_light));
     const auto reached = hn::And(hn::Gt(geometry, zero), inside);
     if (hn::AllFalse(d, reached)) continue;
     const V3 f = Reflectance<kLobes>(d, points, p, normal, to_light);
@@ -54,16 +70,21 @@ HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, co
   return kept;
 }
 
-template <VplKind kKind>
+template <VplKind kKind, bool kScatter = false>
 HWY_INLINE size_t LightKind(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points,
-                            size_t first, size_t count, LitPoints& lit, const uint16_t* wanted) {
-  if (points.ggx()) return Light<kKind, Lobes::ggx>(light, intensity, clamp2, points, first, count, lit, wanted);
-  return points.glossy() ? Light<kKind, Lobes::cosine>(light, intensity, clamp2, points, first, count, lit, wanted)
-                         : Light<kKind, Lobes::none>(light, intensity, clamp2, points, first, count, lit, wanted);
+                            size_t first, size_t count, LitPoints& lit, const uint16_t* wanted,
+                            const DirectionScatter* scatter = nullptr) {
+  const auto with = [&]<Lobes kLobes>() {
+    return Light<kKind, kLobes, kScatter>(light, intensity, clamp2, points, first, count, lit, wanted, scatter);
+  };
+  if (points.ggx()) return with.template operator()<Lobes::ggx>();
+  return points.glossy() ? with.template operator()<Lobes::cosine>() : with.template operator()<Lobes::none>();
 }
 
 size_t LightPoints(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
-                   size_t count, LitPoints& lit, const uint16_t* wanted) {
+                   size_t count, LitPoints& lit, const uint16_t* wanted, const DirectionScatter* scatter) {
+  if (scatter != nullptr)
+    return LightKind<VplKind::oriented, true>(light, intensity, clamp2, points, first, count, lit, wanted, scatter);
   switch (light.kind) {
     case VplKind::omni:
       return LightKind<VplKind::omni>(light, intensity, clamp2, points, first, count, lit, wanted);
@@ -85,8 +106,8 @@ namespace lumicut {
 HWY_EXPORT(LightPoints);
 
 void light_points(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
-                  size_t count, LitPoints& lit, const uint16_t* lanes) {
-  lit.count = HWY_DYNAMIC_DISPATCH(LightPoints)(light, intensity, clamp2, points, first, count, lit, lanes);
+                  size_t count, LitPoints& lit, const uint16_t* lanes, const DirectionScatter* scatter) {
+  lit.count = HWY_DYNAMIC_DISPATCH(LightPoints)(light, intensity, clamp2, points, first, count, lit, lanes, scatter);
 }
 
 Rgb light_point(const Vpl& light, const Rgb& intensity, float clamp2, const SurfacePoint& point) {

@@ -109,21 +109,50 @@ class IlluminationCut final : public Integrator {
   struct Representative {
     const Vpl& seen;
     Vpl shining;
+    const DirectionScatter* scatter = nullptr;
   };
   Representative representative(uint32_t index) const {
     const LightNode& node = tree_.node(index);
     if (means_.empty() || node.leaf()) return {tree_.lights()[node.light], tree_.lights()[node.light]};
     const Mean& mean = means_[index];
     Representative r{tree_.lights()[mean.light], tree_.lights()[mean.light]};
-    // The profile of a spot is bent too much for means; so are cosines that some lights cut off at 90 degrees.
+    // The profile of a spot is bent too much for means.
     if (node.kind == VplKind::spot) return r;
     r.shining.position = mean.place;
-    if (node.kind == VplKind::oriented && node.cos_half > 0.8f) r.shining.normal = mean.direction;
+    if (node.kind == VplKind::oriented) r.shining.normal = mean.direction, r.scatter = &mean.scatter;
     return r;
   }
 
-  // Means by luminance, and of the two children's central lights the one nearer to them. A mean direction is shorter
-  // than 1, so that its cosines are the means of the lights' cosines.
+  // What a node's lights together give to a point if nothing stands between, about and up to a factor.
+  float gives(uint32_t index, const Vec3f& position, const Vec3f& normal) const {
+    constexpr float kHorizon = 0.01f;  // some of the lights may be above it where their mean is below
+    const LightNode& node = tree_.node(index);
+    const Mean& mean = means_[index];
+    const float light = luminance(node.intensity);
+    if (node.kind == VplKind::directional) return light * std::max(kHorizon, -dot(normal, mean.direction));
+    const Vec3f v = mean.place - position;
+    const float dist2 = std::max(length2(v), 1e-30f);
+    const Vec3f to_light = v / std::sqrt(dist2);
+    const float cosine = node.kind == VplKind::oriented ? mean_cosine(mean.direction, mean.scatter, to_light) : 1.0f;
+    return light * cosine * std::max(kHorizon, dot(normal, to_light)) / std::max(dist2, clamp2_);
+  }
+
+  // One of a node's lights, drawn in proportion to about what each gives to the point. The mean shines for all of them:
+  // a light that faces away, or any one that is the same for every pair, would cast other shadows than they do.
+  const Vpl& draw(uint32_t index, const Vec3f& position, const Vec3f& normal, float random) const {
+    while (!tree_.node(index).leaf()) {
+      const uint32_t left = tree_.node(index).first_child;
+      const float l = gives(left, position, normal), r = gives(left + 1, position, normal);
+      const float p = l + r > 0.0f ? l / (l + r) : 0.5f;
+      const bool go_left = random < p || !(r > 0.0f);
+      random = go_left ? random / p : (random - p) / (1.0f - p);
+      index = left + static_cast<uint32_t>(!go_left);
+    }
+    return tree_.lights()[tree_.node(index).light];
+  }
+
+  // Means by luminance, and of the two children's central lights the one nearer to them: it casts the shadows of the
+  // coarse image.
   void find_means() {
     const auto count = static_cast<uint32_t>(tree_.node_count());
     means_.resize(count);
@@ -132,7 +161,7 @@ class IlluminationCut final : public Integrator {
       Mean& mean = means_[n];
       if (node.leaf()) {
         const Vpl& light = tree_.lights()[node.light];
-        mean = {light.position, light.normal, node.light};
+        mean = {light.position, light.normal, {}, node.light};
         continue;
       }
       const uint32_t left = node.first_child, right = left + 1;
@@ -141,6 +170,13 @@ class IlluminationCut final : public Integrator {
       mean.place = means_[left].place * share + means_[right].place * (1.0f - share);
       mean.direction = means_[left].direction * share + means_[right].direction * (1.0f - share);
       const float size2 = std::max(length2(node.half), 1e-30f);
+      const DirectionScatter &a = means_[left].scatter, &b = means_[right].scatter;
+      const Vec3f apart = means_[left].direction - means_[right].direction;
+      const float other = 1.0f - share, k = share * other * 0.63661977f;  // 2/π
+      mean.scatter = {
+          a.xx * share + b.xx * other + k * apart.x * apart.x, a.yy * share + b.yy * other + k * apart.y * apart.y,
+          a.zz * share + b.zz * other + k * apart.z * apart.z, a.xy * share + b.xy * other + k * apart.x * apart.y,
+          a.xz * share + b.xz * other + k * apart.x * apart.z, a.yz * share + b.yz * other + k * apart.y * apart.z};
       const auto distance = [&](uint32_t child) {
         const Vpl& light = tree_.lights()[means_[child].light];
         return length2(light.position - mean.place) / size2 + length2(light.normal - mean.direction);
@@ -273,7 +309,7 @@ class IlluminationCut final : public Integrator {
     if (accept != 0) {
       const Representative light = representative(item.node);
       const auto lanes = static_cast<uint16_t>(accept);
-      light_points(light.shining, node.intensity, clamp2_, reps, first, kLanes, lit, &lanes);
+      light_points(light.shining, node.intensity, clamp2_, reps, first, kLanes, lit, &lanes, light.scatter);
       trace_lit(scene_->accel(), light.seen, lit);
       total.rays += lit.count;
       for (size_t i = 0; i < lit.count; ++i) {
@@ -416,7 +452,10 @@ class IlluminationCut final : public Integrator {
     const LightNode& node = tree_.node(index);
     if (!stochastic_ || node.leaf()) {
       const Representative light = representative(index);
-      add_light(points, region, group, light, node.intensity, lanes, node.leaf(), index, work);
+      const Shadow shadow = node.leaf()                                    ? Shadow::exact
+                            : means_.empty() || node.kind == VplKind::spot ? Shadow::of_seen
+                                                                           : Shadow::of_drawn;
+      add_light(points, region, group, light, node.intensity, lanes, shadow, index, work);
       return;
     }
     // One representative a leaf of points, drawn in proportion to luminance: unbiased, and its error is noise.
@@ -434,25 +473,34 @@ class IlluminationCut final : public Integrator {
       }
       const float share = luminance(node.intensity) / luminance(at->intensity);
       const Vpl& light = tree_.lights()[at->light];
-      add_light(points, region, group, {light, light}, at->intensity * share, one, false, index, work);
+      add_light(points, region, group, {light, light}, at->intensity * share, one, Shadow::of_seen, index, work);
     }
   }
 
+  // Whose shadow: of the light that alone is meant, traced whole; of the representative that is seen; of a drawn one.
+  enum class Shadow { exact, of_seen, of_drawn };
+
   void add_light(const PointTree& points, size_t region, size_t group, const Representative& light,
-                 const Rgb& intensity, const GroupLanes& lanes, bool exact, uint32_t index, Workspace& work) const {
+                 const Rgb& intensity, const GroupLanes& lanes, Shadow shadow, uint32_t index, Workspace& work) const {
     const size_t base = group * kGroup, first = region * kRegion + base;
     LitPoints& lit = work.lit;
     light_points(light.shining, intensity, clamp2_, points.points, first, std::min(kGroup, points.size() - first), lit,
-                 lanes.data());
+                 lanes.data(), light.scatter);
     if (lit.count == 0) return;
-    if (visibility_ == Visibility::full || exact || lit.count < kSampleFrom) {
-      trace_lit(scene_->accel(), light.seen, lit);
+    const Vpl* seen = &light.seen;
+    if (shadow == Shadow::of_drawn) {
+      const size_t middle = first + lit.index[lit.count / 2];
+      Rng rng(seed_, Stage::representative, (uint64_t{points.points.pixel[first]} << 32) | first, index);
+      seen = &draw(index, points.points.position_at(middle), points.points.normal_at(middle), rng.next_float());
+    }
+    if (visibility_ == Visibility::full || shadow == Shadow::exact || lit.count < kSampleFrom) {
+      trace_lit(scene_->accel(), *seen, lit);
       for (size_t i = 0; i < lit.count; ++i) {
         work.weight[i] = lit.occluded[i] ? 0.0f : 1.0f;
         ++work.rays[base + lit.index[i]];
       }
     } else {
-      sample_visibility(light.seen, base, index, first, work);
+      sample_visibility(*seen, base, index, first, work);
     }
     for (size_t i = 0; i < lit.count; ++i) {
       const size_t at = base + lit.index[i];
@@ -534,6 +582,7 @@ class IlluminationCut final : public Integrator {
   LightTree tree_;
   struct Mean {
     Vec3f place, direction;
+    DirectionScatter scatter;
     uint32_t light = 0;  // the central one
   };
   std::vector<Mean> means_;  // a node; empty: the tree's own representatives serve
@@ -553,8 +602,7 @@ std::vector<ParamInfo> params() {
        "corrections",
        "", ParamType::choice, "sampling", 0, 0, "full|sampling|unbiased"},
       {"representative", "Representative",
-       "What stands for a cluster of lights. mean: their mean shines, the light nearest to it casts the shadows; "
-       "random: "
+       "What stands for a cluster of lights. mean: their mean shines, one drawn for each pair casts shadows; random: "
        "one, drawn once by luminance; stochastic: drawn anew for each 16 points and pair, noise in place of banding",
        "", ParamType::choice, "mean", 0, 0, "mean|random|stochastic"},
       {"dark_floor", "Dark floor", "Points darker than this are held to its error", "of the mean radiance",

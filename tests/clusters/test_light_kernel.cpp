@@ -48,4 +48,49 @@ TEST(LightKernel, LightOnThePointItselfStaysFinite) {
   }
 }
 
+TEST(LightKernel, MeanOfAClusterShinesAsItsLightsTogether) {
+  // Normals of every spread, from one direction to all.
+  for (const float spread : {0.0f, 0.3f, 1.0f, 3.0f, 100.0f}) {
+    for (uint32_t trial = 0; trial < 50; ++trial) {
+      Rng rng(trial, Stage::test, static_cast<uint64_t>(spread * 10.0f));
+      const auto direction = [&] {
+        return normalize(Vec3f{rng.next_float() - 0.5f, rng.next_float() - 0.5f, rng.next_float() - 0.5f});
+      };
+      const Vec3f axis = direction(), to_light = direction();
+      constexpr int kLights = 400;
+      std::vector<Vec3f> normals;
+      Vec3f mean{};
+      for (int i = 0; i < kLights; ++i) {
+        normals.push_back(normalize(axis + direction() * spread));
+        mean = mean + normals.back() / float{kLights};
+      }
+      DirectionScatter s;
+      double exact = 0.0;
+      for (const Vec3f& n : normals) {
+        const Vec3f d = n - mean;
+        const float k = 0.63661977f / float{kLights};
+        s.xx += k * d.x * d.x, s.yy += k * d.y * d.y, s.zz += k * d.z * d.z;
+        s.xy += k * d.x * d.y, s.xz += k * d.x * d.z, s.yz += k * d.y * d.z;
+        exact += std::max(0.0f, -dot(n, to_light)) / kLights;
+      }
+      EXPECT_NEAR(mean_cosine(mean, s, to_light), exact, spread == 0.0f ? 1e-5 : 0.05) << spread;
+      EXPECT_GE(mean_cosine(mean, s, to_light), 0.0f);
+
+      const ShadePoints points = test::random_points(rng, 64, 1.0f, trial % 2 == 0);
+      Vpl light = test::random_light(rng, VplKind::oriented, 1.5f);
+      light.normal = mean;
+      Vpl omni = light;
+      omni.kind = VplKind::omni;
+      LitPoints lit;
+      light_points(light, light.intensity, 0.01f, points, 0, points.size(), lit, nullptr, &s);
+      for (size_t i = 0; i < lit.count; ++i) {
+        const SurfacePoint point = points.get(lit.index[i]);
+        const Rgb expected = light_point(omni, light.intensity, 0.01f, point) *
+                             mean_cosine(mean, s, normalize(light.position - point.position));
+        EXPECT_NEAR(lit.g[i], expected.y, 2e-3f * expected.y + 1e-4f * max_component(light.intensity));
+      }
+    }
+  }
+}
+
 }  // namespace lumicut
