@@ -152,7 +152,8 @@ class LumicutEngine(bpy.types.RenderEngine):
             self._check()
             for name, value in parameters.items():
                 integrator.set(name, value)
-            with library.Render(integrator, target, width, height, samples, crop, self._tile_size(crop)) as render:
+            with library.Render(integrator, target, width, height, samples, crop, self._tile_size(crop),
+                                1 if self.is_preview else settings.passes) as render:
                 self._follow(render, depsgraph, crop, height)
                 stats = render.stats()
         if not self.is_preview:
@@ -194,7 +195,11 @@ class LumicutEngine(bpy.types.RenderEngine):
                 stopped = True
                 render.cancel()
                 continue
-            self.say((status.phase or b"").decode(), status.fraction)
+            phase, fraction = (status.phase or b"").decode(), status.fraction
+            if status.passes_total > 1:
+                phase = f"pass {min(status.passes_done + 1, status.passes_total)}/{status.passes_total}, {phase}"
+                fraction = status.tiles_done / max(1, status.tiles_total)
+            self.say(phase, fraction)
             if status.state != library.RUNNING:
                 break
             if show_tiles and not stopped and time.perf_counter() > tiles_shown + SHOW_SECONDS:

@@ -232,6 +232,8 @@ class Writer:
 def command_of(path, settings):
     """The command that renders the exported scene as F12 does."""
     words = ["lumicut", "render", str(path), "-i", settings.integrator, "--accel", settings.accel]
+    if settings.passes > 1:
+        words += ["--passes", str(settings.passes)]
     for name, value in properties.parameters_of(settings).items():
         words += ["-p", f"{name}={value}"]
     return words + ["-o", str(path.with_suffix(".exr"))]

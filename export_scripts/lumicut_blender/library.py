@@ -61,7 +61,8 @@ class DeviceDesc(Descriptor):
 
 class Status(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("state", c_int32), ("phase", c_char_p), ("fraction", c_double),
-                ("seconds", c_double), ("tiles_done", c_uint64), ("tiles_total", c_uint64)]
+                ("seconds", c_double), ("tiles_done", c_uint64), ("tiles_total", c_uint64), ("passes_done", c_uint32),
+                ("passes_total", c_uint32), ("error", c_double)]
 
 
 class SceneDesc(Descriptor):
@@ -92,7 +93,8 @@ class Light(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("type", c_uint32), ("unit", c_uint32), ("group", c_uint32),
                 ("color", c_float * 3), ("value", c_float), ("position", c_float * 3), ("radius", c_float),
                 ("direction", c_float * 3), ("angle", c_float), ("u", c_float * 3), ("blend", c_float),
-                ("v", c_float * 3), ("spread", c_float), ("spot_cosine", c_uint32)]
+                ("v", c_float * 3), ("spread", c_float), ("spot_cosine", c_uint32), ("profile", c_uint32),
+                ("tangent", c_float * 3)]
 
 
 class Environment(Descriptor):
@@ -120,7 +122,9 @@ class ParamInfo(Descriptor):
 
 class RenderDesc(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("width", c_uint32), ("height", c_uint32), ("samples", c_uint32),
-                ("crop", c_uint32 * 4), ("tile_size", c_uint32)]
+                ("crop", c_uint32 * 4), ("tile_size", c_uint32), ("passes", c_uint32), ("max_seconds", c_float),
+                ("target_error", c_float), ("confidence", c_float), ("flags", c_uint32), ("checkpoint", c_void_p),
+                ("checkpoint_size", c_uint64)]
 
 
 class Tile(Descriptor):
@@ -132,8 +136,8 @@ class ChannelInfo(Descriptor):
 
 
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
-SIZES = {DeviceDesc: 32, Status: 48, SceneDesc: 16, Texture: 32, Material: 92, Mesh: 88, Light: 100, Environment: 64,
-         Camera: 92, IntegratorInfo: 40, ParamInfo: 72, RenderDesc: 36, Tile: 20, ChannelInfo: 24}
+SIZES = {DeviceDesc: 32, Status: 64, SceneDesc: 16, Texture: 32, Material: 92, Mesh: 88, Light: 116, Environment: 64,
+         Camera: 92, IntegratorInfo: 40, ParamInfo: 72, RenderDesc: 72, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32
 HANDLE = c_void_p
@@ -384,10 +388,10 @@ class Integrator(Handle):
 class Render(Handle):
     """A frame that renders in the background. Tiles and crop count rows from the top."""
 
-    def __init__(self, integrator, scene, width, height, samples=1, crop=None, tile_size=0):
+    def __init__(self, integrator, scene, width, height, samples=1, crop=None, tile_size=0, passes=1):
         super().__init__(integrator.library)
         self.crop = tuple(crop) if crop else (0, 0, width, height)
-        desc = RenderDesc(width=width, height=height, samples=samples, tile_size=tile_size)
+        desc = RenderDesc(width=width, height=height, samples=samples, tile_size=tile_size, passes=passes)
         desc.crop[:] = self.crop
         self.components = self.library.channels()
         self._create("render_start", integrator.pointer, scene.pointer, ctypes.byref(desc))

@@ -129,6 +129,7 @@ class LUMICUT_PT_integrator(Panel, bpy.types.Panel):
         for p in properties.tables.group(settings.integrator):
             column.prop(getattr(settings, settings.integrator), p["id"])
         layout.prop(settings, "samples")
+        layout.prop(settings, "passes")
 
 
 class LUMICUT_PT_lights(Panel, bpy.types.Panel):

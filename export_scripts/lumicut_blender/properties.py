@@ -103,6 +103,7 @@ def parameters_of(settings, integrator=None):
 
 def apply_preset(settings, name):
     _, _, own, integrator, values = PRESETS[name]
+    settings.property_unset("passes")
     for key, value in own.items():
         setattr(settings, key, value)
     known = [row[0] for row in tables.integrators]
@@ -125,6 +126,8 @@ def register():
     annotations = {
         "samples": IntProperty(name="Samples", description="Samples a pixel, for edges, texture and depth of field. One lies at the pixel's centre",
                                default=4, min=1, max=65536, soft_max=64),
+        "passes": IntProperty(name="Passes", description="Whole images with virtual lights of their own, averaged: with Compensate they converge to the path traced image",
+                              default=1, min=1, max=1 << 20, soft_max=64),
         "accel": EnumProperty(name="Tree for Rays", description="What finds the triangles that rays hit", items=ACCELS, default="agglomerative"),
         "max_shininess": FloatProperty(name="Gloss Limit", description="Sharpest glossy lobe that lights shade, as Blinn's exponent: sharper ones, up to mirrors, show the virtual lights as blots",
                                        default=300.0, min=1.0, max=100000.0),

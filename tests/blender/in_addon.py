@@ -71,6 +71,8 @@ class Tables(unittest.TestCase):
             for p in parameters:
                 if p["type"] in (library.INT, library.FLOAT):
                     self.assertEqual(float(text[p["id"]]), float(p["default_text"]), (identifier, p["id"]))
+                elif p["type"] == library.BOOL:
+                    self.assertEqual(text[p["id"]] == "true", p["default_text"] in {"1", "true"}, (identifier, p["id"]))
                 else:
                     self.assertEqual(text[p["id"]], p["default_text"], (identifier, p["id"]))
 
