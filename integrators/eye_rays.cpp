@@ -1,8 +1,7 @@
 #include "integrators/eye_rays.h"
 
-#include <bit>
-
 #include "scene/bsdf.h"
+#include "scene/place_rng.h"
 
 namespace lumicut {
 
@@ -13,14 +12,6 @@ EyeRays::EyeRays(const Scene& scene, float distance, uint64_t seed)
       emitters_(scene),
       lamps_(scene, emitters_, distance),
       lamp_surfaces_(scene) {}
-
-Rng EyeRays::rng_of(const SurfacePoint& point, uint32_t level) const {
-  const Vec3f at = (point.position - scene_.bounds().lo) / scene_.radius();
-  const auto word = [](float a, float b) {
-    return static_cast<uint64_t>(std::bit_cast<uint32_t>(a)) << 32 | std::bit_cast<uint32_t>(b);
-  };
-  return {hash64(seed_, level), Stage::eye_ray, word(at.x, at.y), word(at.z, point.normal.x + point.mirror.x)};
-}
 
 void EyeRays::near_lamps(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, EyeHits& hits) const {
   lamps_.for_each_share(point, rng, [&](const Vpl& vpl, const Rgb& lost) {
@@ -42,7 +33,7 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
   std::vector<ChainRay> chains;
   for (size_t i = 0; i < points.size(); ++i) {
     const SurfacePoint point = points.get(i);
-    Rng rng = rng_of(point, level);
+    Rng rng = place_rng(scene_, point, hash64(seed_, level), Stage::eye_ray);
     if (!lamps_.empty()) near_lamps(point, rng, shadows, hits);
     const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float();
     const BsdfSample s = Bsdf(point).sample(choice, u, v);

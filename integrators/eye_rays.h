@@ -23,7 +23,6 @@ class EyeRays {
   EyeHits trace(const ShadePoints& points, uint32_t level, Counters& counters) const;
 
  private:
-  Rng rng_of(const SurfacePoint& point, uint32_t level) const;
   void near_lamps(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, EyeHits& hits) const;
 
   const Scene& scene_;

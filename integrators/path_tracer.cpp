@@ -1,6 +1,5 @@
 // Paths from the eye, with a light sampled at every surface: the truth that virtual lights are measured against.
 // [Kajiya 1986; multiple importance sampling: Veach, Guibas 1995]
-#include <bit>
 #include <numbers>
 
 #include "clusters/light_kernel.h"
@@ -8,6 +7,7 @@
 #include "integrators/integrator.h"
 #include "scene/bsdf.h"
 #include "scene/followed.h"
+#include "scene/place_rng.h"
 #include "vpl/emitters.h"
 #include "vpl/lamp_surfaces.h"
 
@@ -45,7 +45,8 @@ class PathTracer final : public Integrator {
         if (context.progress.cancelled()) return;
         paths.clear();
         for (size_t i = begin; i < end; ++i)
-          paths.push_back({points.get(i), rng_of(points.get(i), s), static_cast<uint32_t>(i - begin)});
+          paths.push_back({points.get(i), place_rng(*scene_, points.get(i), hash64(seed_, s), Stage::path),
+                           static_cast<uint32_t>(i - begin)});
         follow(paths, radiance.subspan(begin, end - begin), rays, context);
       }
       for (size_t i = begin; i < end; ++i) {
@@ -73,14 +74,6 @@ class PathTracer final : public Integrator {
     Rgb light;
     uint32_t index;
   };
-
-  Rng rng_of(const SurfacePoint& point, uint32_t sample) const {
-    const Vec3f at = (point.position - scene_->bounds().lo) / scene_->radius();
-    const auto word = [](float a, float b) {
-      return static_cast<uint64_t>(std::bit_cast<uint32_t>(a)) << 32 | std::bit_cast<uint32_t>(b);
-    };
-    return {hash64(seed_, sample), Stage::path, word(at.x, at.y), word(at.z, point.normal.x + point.mirror.x)};
-  }
 
   // All paths of a chunk go on in step, so that rays are traced in batches.
   void follow(std::vector<Path>& paths, std::span<Rgb> radiance, std::vector<uint32_t>& counts,

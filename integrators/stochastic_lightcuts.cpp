@@ -5,7 +5,6 @@
 // - Within a cluster that is small as seen from the point, lights are drawn by intensity alone, in one step; the
 //   descent by distance and orientation goes on only as long as they matter.
 //   docs/decisions/stochastic-lightcuts-descent.md
-#include <bit>
 #include <memory>
 
 #include "clusters/bounds.h"
@@ -15,6 +14,7 @@
 #include "core/rng.h"
 #include "integrators/integrator.h"
 #include "scene/bsdf.h"
+#include "scene/place_rng.h"
 
 namespace lumicut {
 
@@ -132,7 +132,7 @@ class StochasticLightcuts final : public Integrator {
 
   Rgb shade_point(const SurfacePoint& point, Workspace& work, PointCounts& c) const {
     work.rays.clear(), work.light.clear();
-    Rng rng = rng_of(point);
+    Rng rng = place_rng(*scene_, point, seed_, Stage::representative);
     for (const CutNode& cut : work.heap) {
       const Draw draw = draw_light(cut.node, point, rng);
       if (!(draw.probability > 0.0f)) continue;
@@ -158,15 +158,6 @@ class StochasticLightcuts final : public Integrator {
       ++c.clusters;
     }
     return sum;
-  }
-
-  // Numbers that belong to the place of a point within the scene: the same in any batch, at any scale.
-  Rng rng_of(const SurfacePoint& point) const {
-    const Vec3f at = (point.position - scene_->bounds().lo) / scene_->radius();
-    const auto word = [](float a, float b) {
-      return static_cast<uint64_t>(std::bit_cast<uint32_t>(a)) << 32 | std::bit_cast<uint32_t>(b);
-    };
-    return {seed_, Stage::representative, word(at.x, at.y), word(at.z, point.normal.x + point.mirror.x)};
   }
 
   // One light of the node's, with the probability that it was drawn. Every light that can give the point anything is
