@@ -154,15 +154,17 @@ class Batch {
                     ShadeContext context) {
     add_light(first, light, context);
     if (eye_rays == nullptr) return;
-    ShadePoints points = first;
-    for (uint32_t level = 1; level <= kMaxLevels && points.size() > 0; ++level) {
+    const ShadePoints* points = &first;
+    ShadePoints found;
+    for (uint32_t level = 1; level <= kMaxLevels && points->size() > 0; ++level) {
       context.progress.check();
       Counters counters;
-      const EyeHits hits = eye_rays->trace(points, level, counters);
+      const EyeHits hits = eye_rays->trace(*points, level, counters);
       context.stats.add(counters);
       for (size_t i = 0; i < hits.light.size(); ++i) light[slot(hits.group[i])][hits.pixel[i]] += hits.light[i];
-      points = hits.points();
-      add_light(points, light, context);
+      found = hits.points();
+      add_light(found, light, context);
+      points = &found;
     }
   }
 

@@ -6,7 +6,6 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
-#include "film/metrics.h"
 #include "io/atomic_file.h"
 #include "io/file_error.h"
 #include "io/image_file.h"
@@ -17,6 +16,7 @@
 #include "io/vpl_file.h"
 #include "lumicut/lumicut_state.h"
 #include "tools/commands.h"
+#include "tools/exposed_png.h"
 #include "tools/render_setup.h"
 
 namespace lumicut::tools {
@@ -225,11 +225,8 @@ class FlythroughCommand {
     io::ImageLayer layer{"radiance", 3, {}};
     layer.pixels.resize(size_t{frame_.width} * frame_.height * 3);
     io::check(api(), api().render_read(handle, "radiance", nullptr, layer.pixels.data()), "radiance");
-    if (!o_.png.empty()) {
-      const RgbImage rgb{layer.pixels, frame_.width, frame_.height};
-      io::write_png(numbered(o_.png, index), to_srgb8(rgb, o_.exposure > 0 ? o_.exposure : auto_exposure(rgb)),
-                    image.width, image.height, 3);
-    }
+    if (!o_.png.empty())
+      write_exposed_png(numbered(o_.png, index), {layer.pixels, frame_.width, frame_.height}, o_.exposure);
     if (o_.output.empty()) return;
     image.layers.push_back(std::move(layer));
     io::write_exr(numbered(o_.output, index), image, false);

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <map>
 
-#include "film/metrics.h"
 #include "io/file_error.h"
 #include "io/image_file.h"
 #include "tools/commands.h"
+#include "tools/exposed_png.h"
 
 namespace lumicut::tools {
 
@@ -80,10 +80,8 @@ void mix(const Options& o) {
         layer.name == "position")
       out.layers.push_back(layer);
   if (!o.output.empty()) io::write_exr(o.output, out, o.half);
-  if (!o.png.empty()) {
-    const RgbImage rgb{sum, static_cast<uint32_t>(out.width), static_cast<uint32_t>(out.height)};
-    io::write_png(o.png, to_srgb8(rgb, o.exposure > 0 ? o.exposure : auto_exposure(rgb)), out.width, out.height, 3);
-  }
+  if (!o.png.empty())
+    write_exposed_png(o.png, {sum, static_cast<uint32_t>(out.width), static_cast<uint32_t>(out.height)}, o.exposure);
 }
 
 }  // namespace
@@ -97,11 +95,7 @@ void add_mix(CLI::App& app) {
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);
   command->add_option("-o,--output", o->output, "EXR to write");
-  command->add_option("--png", o->png, "PNG to write too: exposed, cut to [0,1], sRGB");
-  command
-      ->add_option("--exposure", o->exposure,
-                   "Factor from radiance to [0,1] for the PNG (default: 0.18 / geometric mean)")
-      ->check(CLI::NonNegativeNumber);
+  add_png_options(*command, o->png, o->exposure);
   command->add_flag("--half", o->half, "16 bits a number in the EXR instead of 32");
   command->footer("Example: lumicut mix room.exr --gain 1=0 --gain 2=1,0.8,0.6 -o evening.exr --png evening.png");
   command->callback([o] {

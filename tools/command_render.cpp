@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "film/metrics.h"
 #include "io/atomic_file.h"
 #include "io/file_error.h"
 #include "io/image_file.h"
@@ -19,6 +18,7 @@
 #include "io/scene_upload.h"
 #include "io/vpl_file.h"
 #include "tools/commands.h"
+#include "tools/exposed_png.h"
 #include "tools/heat_map.h"
 #include "tools/interrupt_watcher.h"
 #include "tools/preflight.h"
@@ -380,9 +380,7 @@ class RenderCommand {
     if (!o_.output.empty()) io::write_exr(o_.output, image, o_.half);
     if (!o_.png.empty()) {
       const auto radiance = read({"radiance", 3});
-      const RgbImage rgb{radiance.pixels, width, height};
-      io::write_png(o_.png, to_srgb8(rgb, o_.exposure > 0 ? o_.exposure : auto_exposure(rgb)), image.width,
-                    image.height, 3);
+      write_exposed_png(o_.png, {radiance.pixels, width, height}, o_.exposure);
     }
     if (!o_.heat_maps.empty())
       for (const CountLayer& counts : kCountLayers) {
@@ -451,11 +449,7 @@ void add_render(CLI::App& app) {
   command->add_option("scene", o->scene, "Scene, JSON: docs/scene_format.md")->required();
   add_setup_options(*command, *o);
   command->add_option("-o,--output", o->output, "EXR to write");
-  command->add_option("--png", o->png, "PNG to write too: exposed, cut to [0,1], sRGB");
-  command
-      ->add_option("--exposure", o->exposure,
-                   "Factor from radiance to [0,1] for the PNG (default: 0.18 / geometric mean)")
-      ->check(CLI::NonNegativeNumber);
+  add_png_options(*command, o->png, o->exposure);
   command->add_option(
       "--layers", o->layers,
       "Layers of the EXR, with commas, or `all` (default: radiance,depth,normal,albedo,cut_size,rays,bounds)");

@@ -358,17 +358,18 @@ Vpl Emitters::sample_direct(double u, uint64_t count, Rng& rng) const {
   const Emitter& e = emitters_[i];
   const auto weight =
       static_cast<float>(power_.sum(extended_, emitters_.size()) / (power_.sum(i, i + 1) * static_cast<double>(count)));
-  Vpl v;
-  if (e.kind == Kind::sun) {
-    const Light& l = scene_.lights()[e.index];
-    v.kind = VplKind::directional, v.normal = sample_sun(l, rng), v.intensity = l.value * weight, v.group = l.group;
-    return v;
-  }
   float area_pdf;
-  return surface_light(e, weight, rng, area_pdf);
+  return extended_light(e, weight, rng, area_pdf);
 }
 
-Vpl Emitters::surface_light(const Emitter& e, float weight, Rng& rng, float& area_pdf) const {
+Vpl Emitters::extended_light(const Emitter& e, float weight, Rng& rng, float& area_pdf) const {
+  if (e.kind == Kind::sun) {
+    const Light& l = scene_.lights()[e.index];
+    Vpl v;
+    v.kind = VplKind::directional, v.normal = sample_sun(l, rng), v.intensity = l.value * weight, v.group = l.group;
+    area_pdf = 0.0f;
+    return v;
+  }
   const Surface s = sample_surface(e, rng);
   area_pdf = s.area_pdf;
   const uint32_t group = e.kind == Kind::triangle ? scene_.meshes()[e.index].group : scene_.lights()[e.index].group;
@@ -402,15 +403,9 @@ DirectSample Emitters::sample_one(Rng& rng) const {
   const Emitter& e = emitters_[i];
   const double share = (1.0 - environment_share_) * power_.sum(i, i + 1) / power_.sum(extended_, emitters_.size());
   const auto weight = static_cast<float>(1.0 / share);
-  if (e.kind == Kind::sun) {
-    const Light& l = scene_.lights()[e.index];
-    s.vpl.kind = VplKind::directional, s.vpl.normal = sample_sun(l, rng), s.vpl.intensity = l.value * weight;
-    s.vpl.group = l.group;
-    return s;
-  }
   float area_pdf;
-  s.vpl = surface_light(e, weight, rng, area_pdf);
-  s.seen_by_rays = e.kind != Kind::sphere, s.density = share * area_pdf;
+  s.vpl = extended_light(e, weight, rng, area_pdf);
+  s.seen_by_rays = e.kind != Kind::sphere && e.kind != Kind::sun, s.density = share * area_pdf;
   return s;
 }
 
@@ -428,7 +423,7 @@ Vpl Emitters::sample_lamp(uint32_t lamp, Rng& rng) const {
   const Kind kind =
       l.type == LightType::point ? Kind::sphere : (l.type == LightType::disk ? Kind::disk : Kind::rectangle);
   float area_pdf;
-  return surface_light({kind, lamp, 0, 0}, 1.0f, rng, area_pdf);
+  return extended_light({kind, lamp, 0, 0}, 1.0f, rng, area_pdf);
 }
 
 double Emitters::area_density(double emission) const {

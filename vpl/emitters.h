@@ -96,8 +96,8 @@ class Emitters {
   double environment_power();
   void add_triangles(std::vector<double>& weights);
   Surface sample_surface(const Emitter& e, Rng& rng) const;
-  // A sample as a virtual light that stands for `weight` of the emitter.
-  Vpl surface_light(const Emitter& e, float weight, Rng& rng, float& area_pdf) const;
+  // A sample of an emitter with extent as a virtual light that stands for `weight` of it; a sun's has no area_pdf: 0.
+  Vpl extended_light(const Emitter& e, float weight, Rng& rng, float& area_pdf) const;
   // Of sample_one: density of a place whose emission has this luminance on average.
   double area_density(double emission) const;
   // Direction towards the environment, its radiance and density per steradian, from u and v in [0,1).
