@@ -1,5 +1,6 @@
 #include "integrators/eye_rays.h"
 
+#include "clusters/light_kernel.h"
 #include "scene/bsdf.h"
 #include "scene/place_rng.h"
 
@@ -22,6 +23,24 @@ void EyeRays::near_lamps(const SurfacePoint& point, Rng& rng, std::vector<Ray>& 
   });
 }
 
+// By power over all meshes: where few emit, most samples hit a near one; where many do, the rays find them.
+void EyeRays::near_mesh(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, EyeHits& hits) const {
+  const DirectSample s = emitters_.sample_one(rng);
+  if (!s.on_mesh) return;
+  const Vec3f v = s.vpl.position - point.position;
+  const float d2 = length2(v), c2 = distance_ * distance_;
+  if (!(d2 < c2)) return;
+  const Rgb lost = light_point(s.vpl, s.vpl.intensity, 0.0f, point) * (1.0f - d2 / c2);
+  if (!(max_component(lost) > 0.0f) || !is_finite(lost)) return;
+  const Vec3f to_light = normalize(v);
+  const double cosine = std::max(1e-9f, -dot(s.vpl.normal, to_light));
+  Ray ray;  // ends before the mesh, which blocks
+  ray.org = point.position, ray.dir = v + s.vpl.normal * scene_.epsilon();
+  ray.tnear = 0.0f, ray.tfar = 1.0f;
+  shadows.push_back(ray);
+  hits.add(lost * mis_weight(s.density * d2 / cosine, Bsdf(point).pdf(to_light)), point.pixel, s.vpl.group);
+}
+
 EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& counters) const {
   EyeHits hits;
   std::vector<RayHit> rays;
@@ -35,6 +54,7 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
     const SurfacePoint point = points.get(i);
     Rng rng = place_rng(scene_, point, hash64(seed_, level), Stage::eye_ray);
     if (!lamps_.empty()) near_lamps(point, rng, shadows, hits);
+    if (emitters_.has_meshes()) near_mesh(point, rng, shadows, hits);
     const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float();
     const BsdfSample s = Bsdf(point).sample(choice, u, v);
     if (!(s.pdf > 0.0f) || !is_finite(s.weight)) continue;
@@ -66,8 +86,12 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
     const float share = rays[i].ray.tfar / distance_, lost = std::max(0.0f, 1.0f - share * share);
     if (lost > 0.0f) {
       const Rgb emitted = scene_.emitted(surface, to_viewer);
-      if (max_component(emitted) > 0.0f)
-        hits.add(emitted * weights[i] * lost, pixels[i], scene_.meshes()[surface.mesh].group);
+      if (max_component(emitted) > 0.0f) {
+        const double cosine = std::max(1e-9f, std::abs(dot(surface.geometric_normal, to_viewer)));
+        const double density = emitters_.mesh_density(surface) * double{surface.t} * surface.t / cosine;
+        hits.add(emitted * weights[i] * (lost * mis_weight(pdfs[i], density)), pixels[i],
+                 scene_.meshes()[surface.mesh].group);
+      }
     }
     // Mirrors and glass show it what is behind them: no virtual light shines by way of those.
     if (auto ray = start_chain(scene_, surface, to_viewer, weights[i], pixels[i], rngs[i])) chains.push_back(*ray);

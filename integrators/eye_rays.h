@@ -18,12 +18,14 @@ class EyeRays {
   // `distance`: that of the clamp, above 0. Scene outlives this.
   EyeRays(const Scene& scene, float distance, uint64_t seed);
 
-  // One ray from each point (unless it is cut short by chance, or the point is black), and one sample of each near
-  // lamp. `level` counts the surfaces since the camera. Deterministic: numbers belong to the places of points.
+  // One ray from each point (unless it is cut short by chance, or the point is black), one sample of each near lamp,
+  // and one of all emissive meshes. `level` counts the surfaces since the camera. Deterministic: numbers belong to the places of points.
   EyeHits trace(const ShadePoints& points, uint32_t level, Counters& counters) const;
 
  private:
   void near_lamps(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, EyeHits& hits) const;
+
+  void near_mesh(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, EyeHits& hits) const;
 
   const Scene& scene_;
   const float distance_;

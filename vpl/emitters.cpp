@@ -198,6 +198,7 @@ void Emitters::add_triangles(std::vector<double>& weights) {
       if (materials[mesh.material_of(t)].emissive()) count += scene_.instance_count(m);
   }
   if (count == 0) return;
+  has_meshes_ = true;
   emitters_.reserve(emitters_.size() + count);
   weights.reserve(weights.size() + count);
 
@@ -405,6 +406,7 @@ DirectSample Emitters::sample_one(Rng& rng) const {
   const auto weight = static_cast<float>(1.0 / share);
   float area_pdf;
   s.vpl = extended_light(e, weight, rng, area_pdf);
+  s.on_mesh = e.kind == Kind::triangle;
   s.seen_by_rays = e.kind != Kind::sphere && e.kind != Kind::sun, s.density = share * area_pdf;
   return s;
 }

@@ -41,7 +41,8 @@ struct EmittedRay {
 struct DirectSample {
   Vpl vpl;
   bool seen_by_rays = false;  // paths may find it too: a mesh, the environment, a rectangle or disk [lamp_surfaces.h]
-  double density = 0.0;       // of those: for each unit of area, or for each steradian of the environment
+  bool on_mesh = false;
+  double density = 0.0;       // of what rays find: for each unit of area, or for each steradian of the environment
 };
 
 // Radiance of a rectangle or disk at the cosine to its axis, above 0.
@@ -58,6 +59,8 @@ class Emitters {
   bool has_extended() const { return extended_ < emitters_.size(); }
   // One of `count` VPLs that stand for these emitters' direct light; `u` in [0,1) chooses the emitter by power.
   Vpl sample_direct(double u, uint64_t count, Rng& rng) const;
+  // True where some mesh emits.
+  bool has_meshes() const { return has_meshes_; }
   bool has_environment() const { return environment_share_ > 0.0; }
   // Of the power of environment and extended emitters.
   double environment_share() const { return environment_share_; }
@@ -112,6 +115,7 @@ class Emitters {
   std::vector<Emitter> emitters_;
   size_t extended_ = 0;
   double environment_share_ = 0.0;
+  bool has_meshes_ = false;
   DiscreteDistribution power_;
   std::vector<Vpl> delta_;
   // Environment: density over texels, rows weighted by the sine of the polar angle.
