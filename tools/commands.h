@@ -52,5 +52,6 @@ void add_bench(CLI::App& app);
 void add_report(CLI::App& app);
 void add_info(CLI::App& app);
 void add_check(CLI::App& app);
+void add_errors(CLI::App& app);
 
 }  // namespace lumicut::tools

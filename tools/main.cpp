@@ -30,6 +30,7 @@ int run(int argc, char** argv) {
       "  lumicut render scene.json -i lightcuts -o out.exr    an image\n"
       "  lumicut render scene.json -i exhaustive -o ref.exr   the same from all lights: the reference\n"
       "  lumicut compare out.exr ref.exr                      how far the one is from the other\n"
+      "  lumicut errors scene.json -i lightcuts               what its error is made of\n"
       "  lumicut mix out.exr --gain 1=0.5 -o mixed.exr        one lamp dimmed, without a render\n"
       "  lumicut bench plan.json -o out/bench                 scenes and methods: times, counts, errors\n"
       "  lumicut report out/bench/results.json -o page.html   the same as a page\n");
@@ -41,6 +42,7 @@ int run(int argc, char** argv) {
   add_render(app);
   add_flythrough(app);
   add_compare(app);
+  add_errors(app);
   add_mix(app);
   add_bench(app);
   add_report(app);
