@@ -4,7 +4,7 @@
     blender -b room.blend --addons lumicut_blender -P bench/blender_room.py -- table --folder room_reference
 
 `reference` renders Cycles without clamping, a part a seed, and keeps what was rendered before. `table` takes the mean of
-the parts; `one` tries settings; `again` measures the images of both once more, against more parts; `bias` asks where the
+the parts; `curve` measures both over time and draws them; `one` tries settings; `again` measures the images of both once more, against more parts; `bias` asks where the
 missing energy went (means over the image: few samples do). room.blend comes from
 export_scripts/scenes/blender_indirect_room.py. CPU seconds are the process' own.
 """
@@ -16,20 +16,23 @@ import pathlib
 import sys
 import time
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "tests/blender"))
+sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[1] / "tests/blender"), str(pathlib.Path(__file__).resolve().parent)]
 os.environ.setdefault("LUMICUT_SOURCE_DIR", str(pathlib.Path(__file__).resolve().parents[1]))
 import bpy  # noqa: E402
 import numpy as np  # noqa: E402
 
 import helpers as h  # noqa: E402
+import loglog_plot  # noqa: E402
 
-# What is tried for each budget at 320x240: the clamp shrinks and lights grow with time.
+# What is tried for each budget at 320x240: passes grow with time.
+PASS = {"vpls": 3000, "error": 0.05, "compensate": 1}
 SETTINGS = {
-    1: [("stochastic_lightcuts", 1, {"vpls": 1500, "lights": 6})],
-    5: [("illumination_cut", 2, {"vpls": 60000, "error": 0.03, "clamp_relative": 0.03})],
-    20: [("illumination_cut", 7, {"vpls": 300000, "error": 0.015, "clamp_relative": 0.015})],
-    60: [("illumination_cut", 16, {"vpls": 800000, "error": 0.01, "clamp_relative": 0.008})],
+    1: [("illumination_cut", 1, {"vpls": 1500, "error": 0.05, "compensate": 1})],
+    5: [("lightcuts", 1, {"passes": 4, **PASS})],
+    20: [("lightcuts", 1, {"passes": 18, **PASS})],
+    60: [("lightcuts", 1, {"passes": 56, **PASS})],
 }
+CURVE = {"passes": (1, 2, 4, 8, 16, 32, 64), "samples": (2, 8, 32, 128, 512, 1600)}  # `curve`
 CLAMPS = (0.03, 0.003)  # `bias`: what is lost as the clamp shrinks
 
 
@@ -64,6 +67,7 @@ class Reference:
         pixel, block = self.error(image)[0], self.error(image, 8)[0]
         print(f"| {name} | {cpu:.1f} | {100 * pixel:.1f} % | {100 * block:.1f} % | "
               f"{100 * (image.mean() / self.image.mean() - 1):+.1f} % |", flush=True)
+        return pixel
 
 
 def cycles(samples, seed=1, clamp=0.0, bounces=32):
@@ -147,7 +151,7 @@ def bias(options):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("mode", choices=["reference", "table", "one", "again", "bias"])
+    parser.add_argument("mode", choices=["reference", "table", "curve", "one", "again", "bias"])
     parser.add_argument("--folder", type=pathlib.Path, required=True)
     parser.add_argument("--parts", type=int, default=4)
     parser.add_argument("--samples", type=int, default=1024)
@@ -181,28 +185,40 @@ def main():
         return
 
     def lumicut(integrator, samples, values):
+        settings = bpy.context.scene.lumicut
+        for group in (settings.common, getattr(settings, integrator)):  # nothing stays from the row before
+            for name in group.bl_rna.properties.keys():
+                group.property_unset(name)
         image, cpu, wall = measured(lambda: h.set_lumicut(integrator, samples, **values))
         text = ", ".join(f"{k}={v:g}" for k, v in values.items())
-        reference.row(f"Lumicut `{integrator}`, {samples} spp, {text}", image, cpu)
-        return cpu
+        return cpu, reference.row(f"Lumicut `{integrator}`, {samples} spp, {text}", image, cpu)
+
+    def path_traced(samples, clamp):
+        image, cpu, _ = measured(lambda: cycles(samples, 1, clamp))
+        return cpu, reference.row(f"Cycles, {samples} spp, {'clamp 10, as it comes' if clamp else 'no clamp'}", image, cpu)
 
     if options.mode == "one":
         for text in options.lumicut:
             integrator, samples, *pairs = text.split(",")
-            values = {k: (int if k in {"vpls", "lights", "max_depth"} else float)(v) for k, v in (p.split("=") for p in pairs)}
+            values = {k: (int if k in {"vpls", "lights", "max_depth", "passes", "compensate", "seed"} else float)(v) for k, v in (p.split("=") for p in pairs)}
             lumicut(integrator, int(samples), values)
         return
     measured(lambda: cycles(1))  # loads and compiles what it needs
+    if options.mode == "curve":
+        loglog_plot.write(options.folder / "curve.svg", "The indirectly lit room at 320x240, against long Cycles", "CPU seconds",
+                          "RMSE / mean", [
+                              ("Lumicut, lightcuts in passes", [lumicut("lightcuts", 1, {"passes": n, **PASS})
+                                                                for n in CURVE["passes"]]),
+                              ("Cycles", [path_traced(n, 0.0) for n in CURVE["samples"]])])
+        return
     _, low, _ = measured(lambda: cycles(1))
     _, high, _ = measured(lambda: cycles(17))
     rate, fixed = (high - low) / 16, low - (high - low) / 16
     print(f"Cycles: {fixed:.2f} CPU s and {rate:.3f} a sample")
     for budget in options.budgets:
-        spent = max(lumicut(*row) for row in SETTINGS[budget])
-        samples = max(1, round((spent - fixed) / rate))
+        spent = max(lumicut(*row)[0] for row in SETTINGS[budget])
         for clamp in (0.0, 10.0):
-            image, cpu, _ = measured(lambda: cycles(samples, 1, clamp))
-            reference.row(f"Cycles, {samples} spp, {'clamp 10, as it comes' if clamp else 'no clamp'}", image, cpu)
+            path_traced(max(1, round((spent - fixed) / rate)), clamp)
 
 
 main()
