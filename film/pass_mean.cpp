@@ -57,8 +57,7 @@ void PassMean::write_error(uint64_t passes, Film& mean) const {
       for (uint32_t v = std::max(crop_.y0 + 1, y) - 1; v < std::min(crop_.y1, y + 2); ++v)
         for (uint32_t u = std::max(crop_.x0 + 1, x) - 1; u < std::min(crop_.x1, x + 2); ++u, ++count)
           sum += sums_[index(u, v)].squares;
-      const double squares = std::max(sums_[index(x, y)].squares, sum / count);
-      mean.set(Channel::error, x, y, static_cast<float>(t * std::sqrt(std::max(0.0, squares) / (n * (n - 1.0)))));
+      mean.set(Channel::error, x, y, static_cast<float>(t * std::sqrt(std::max(0.0, sum / count) / (n * (n - 1.0)))));
     }
 }
 

@@ -19,8 +19,8 @@ class PassMean {
   // position stay those of the first pass. Rectangles of one pass may be added concurrently.
   void add(const Film& pass, const Rect& rect, uint64_t passes, Film& mean);
 
-  // Fills the channel `error` after a whole pass: t standard errors. The variance is the pixel's own or the mean of its
-  // 3x3 neighbourhood, whichever is larger: a rare bright event that a pixel has not met yet, its neighbours have.
+  // Fills the channel `error` after a whole pass: t standard errors. The variance is the mean over
+  // the pixel's 3x3 neighbourhood: a rare bright event that a pixel has not met yet, its neighbours have.
   void write_error(uint64_t passes, Film& mean) const;
 
   // So large a share of the pixels as the confidence have an interval whose half width is at most this share of their

@@ -21,11 +21,16 @@ uint32_t even_bits(uint32_t x) {
   return (x | x >> 8) & 0x0000ffffu;
 }
 
-// Fills the unit square evenly for any count. [Roberts 2018, R2 sequence]
-Vec2f r2(uint32_t i, Vec2f shift) {
-  const double x = 0.5 + shift.x + i * 0.7548776662466927, y = 0.5 + shift.y + i * 0.5698402909980532;
+// Point i of a sequence that fills the unit square evenly for any count. [Roberts 2018]
+Vec2f rank1(uint64_t i, Vec2f shift, double step_x, double step_y) {
+  const auto at = static_cast<double>(i);
+  const double x = 0.5 + shift.x + at * step_x, y = 0.5 + shift.y + at * step_y;
   return {static_cast<float>(x - std::floor(x)), static_cast<float>(y - std::floor(y))};
 }
+// R2 in the pixel; on the lens two steps of R4, which no whole numbers relate to those: together they fill all four
+// dimensions.
+Vec2f in_pixel(uint64_t i, Vec2f shift) { return rank1(i, shift, 0.7548776662466927, 0.5698402909980532); }
+Vec2f on_lens(uint64_t i, Vec2f shift) { return rank1(i, shift, 0.8566748838545029, 0.7338918566271260); }
 
 // Of radiation weighted by luminance, by convention: what 555 nm has. [docs/units.md]
 constexpr float kLumenPerWatt = 683.0f;
@@ -193,13 +198,14 @@ class Batch {
 
   void camera_rays(size_t p, RayHit* rays, float* cosines) const {
     const auto [x, y] = pixels_[p];
-    Rng rng(options_.seed, Stage::camera, x, y);
+    const auto [seed, first] = options_.camera_samples.value_or(FrameOptions::CameraSamples{options_.seed, 0});
+    Rng rng(seed, Stage::camera, x, y);
     // One sample lies at the centre; more are shifted by a random vector of the pixel's own.
-    const bool centred = options_.samples == 1 && !options_.jitter;
+    const bool centred = options_.samples == 1 && !options_.camera_samples;
     const Vec2f shift = centred ? Vec2f{0, 0} : Vec2f{rng.next_float(), rng.next_float()};
     const Vec2f lens_shift = {rng.next_float(), rng.next_float()};
     for (uint32_t s = 0; s < options_.samples; ++s) {
-      const Vec2f at = r2(s, shift), lens = r2(s, lens_shift);
+      const Vec2f at = in_pixel(first + s, shift), lens = on_lens(first + s, lens_shift);
       const Camera::Sample c = scene_.camera().generate(static_cast<float>(x) + at.x, static_cast<float>(y) + at.y,
                                                         static_cast<float>(options_.width),
                                                         static_cast<float>(options_.height), lens.x, lens.y);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "film/film.h"
 #include "integrators/integrator.h"
@@ -12,8 +13,13 @@ struct FrameOptions {
   uint32_t width = 0, height = 0, samples = 1, tile_size = 64;
   Rect crop;  // inside width × height
   uint64_t seed = 1;
-  float compensate = 0.0f;   // distance of the clamp whose loss rays bring back; 0: none [integrators/eye_rays.h]
-  bool jitter = false;       // a single sample too lies at random in its pixel
+  float compensate = 0.0f;  // distance of the clamp whose loss rays bring back; 0: none [integrators/eye_rays.h]
+  // Of a render in passes: samples go on from here in the pixel's sequence, and a single one lies at random too.
+  struct CameraSamples {
+    uint64_t seed;  // the same in all passes
+    uint64_t first;
+  };
+  std::optional<CameraSamples> camera_samples;
   bool illuminance = false;  // fill that channel: about as long again
 };
 

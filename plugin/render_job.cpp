@@ -147,7 +147,7 @@ void lumicut_render_t::render_passes() {
     integrator_->prepare(*scene_, params_of_pass(integrator_->params, done, scene_->scene), *progress_, stats);
     const Prepared& prepared = *integrator_->prepared;
     FrameOptions frame = frame_options(prepared);
-    frame.jitter = true;
+    frame.camera_samples = {static_cast<uint64_t>(integrator_->params.integer("seed")), uint64_t{done} * frame.samples};
     {
       const PhaseTimer timer(stats, "render");
       render_frame(scene_->scene, methods(prepared, of_groups), frame, pass, {*progress_, stats},
