@@ -44,11 +44,11 @@ struct RayHit {
   Hit hit;
 };
 
-// Cut-outs: asked for each candidate hit on a mesh with `has_cutout`. Called concurrently.
+// Cut-outs and what is partly transparent: asked for each candidate hit on a mesh with `has_cutout`. Called concurrently.
 class HitFilter {
  public:
   virtual ~HitFilter() = default;
-  // True where the surface is a hole and the ray goes on.
+  // True where the surface lets the ray go on; always the same for the same place.
   virtual bool passes(uint32_t mesh, uint32_t prim, float u, float v) const = 0;
 };
 

@@ -1,6 +1,7 @@
 #include "scene/scene.h"
 
 #include "core/error.h"
+#include "core/rng.h"
 
 namespace lumicut {
 
@@ -181,7 +182,18 @@ const Transform& Scene::instance(uint32_t mesh, uint32_t index) const {
   return meshes_[mesh].instances.empty() ? identity : meshes_[mesh].instances[index];
 }
 
+// Chance by the place, so that a ray fares the same whenever it is traced; on a grid, so that last bits of u and v,
+// which differ between ways to trace, do not matter.
 bool Scene::passes(uint32_t mesh_id, uint32_t prim, float u, float v) const {
+  constexpr float kLeast = 1.0f / 256.0f, kCells = 1 << 20;
+  const float stops = opacity(mesh_id, prim, u, v);
+  if (stops < kLeast || stops > 1.0f - kLeast) return stops < kLeast;
+  const auto cell = [](float x) { return static_cast<uint64_t>(std::clamp(x, 0.0f, 1.0f) * kCells); };
+  const uint64_t place = hash64(hash64(mesh_id, prim), cell(u) << 32 | cell(v));
+  return static_cast<float>(place >> 40) * 0x1p-24f >= stops;
+}
+
+float Scene::opacity(uint32_t mesh_id, uint32_t prim, float u, float v) const {
   const Mesh& mesh = meshes_[mesh_id];
   const Material& material = materials_[mesh.material_of(prim)];
   float opacity = material.opacity;
@@ -191,7 +203,7 @@ bool Scene::passes(uint32_t mesh_id, uint32_t prim, float u, float v) const {
     opacity *= textures_[material.opacity_texture].mask(a.x + u * (b.x - a.x) + v * (c.x - a.x),
                                                         a.y + u * (b.y - a.y) + v * (c.y - a.y));
   }
-  return opacity < 0.5f;
+  return opacity;
 }
 
 SurfaceHit Scene::surface(const RayHit& rh) const {

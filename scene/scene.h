@@ -109,6 +109,9 @@ class Scene final : private HitFilter {
   GgxColors ggx_colors(uint32_t material, Vec2f uv) const;
   // Radiance emitted by a surface towards `to_viewer`.
   Rgb emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const;
+  // Share of rays that a place of a triangle stops: factor times mask.
+  float opacity(uint32_t mesh, uint32_t prim, float u, float v) const;
+
   // Radiance of the environment seen along `direction` (unit).
   Rgb environment_radiance(const Vec3f& direction) const;
   // Where on the map it is seen; u repeats.

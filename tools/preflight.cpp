@@ -78,7 +78,7 @@ class World {
         for (uint32_t t = 0; 3 * size_t{t} < mesh.indices.size(); ++t) {
           const uint32_t piece = first_piece + shells[m].shell_of[t];
           const auto& material = scene.materials[mesh.materials[t]].values;
-          const bool hole = material.opacity < 0.5f && material.opacity_texture == 0;
+          const bool hole = material.opacity < 0.01f && material.opacity_texture == 0;
           for (size_t k = 0; k < 3; ++k) {
             const uint32_t v = mesh.indices[3 * size_t{t} + k];
             pieces[piece].box.extend(corner(mesh, v, i));

@@ -285,7 +285,9 @@ Emitters::Surface Emitters::sample_surface(const Emitter& e, Rng& rng) const {
       if (rng.next_float() < 0.5f) surface.geometric_normal = -surface.geometric_normal;
       area_pdf *= 0.5f;
     }
-    return {surface.position, surface.geometric_normal, scene_.emitted(surface, surface.geometric_normal), area_pdf};
+    Rgb radiance = scene_.emitted(surface, surface.geometric_normal);
+    if (material.cutout()) radiance *= scene_.opacity(e.index, e.triangle, hit.hit.u, hit.hit.v);  // as rays meet it
+    return {surface.position, surface.geometric_normal, radiance, area_pdf};
   }
   const Light& l = scene_.lights()[e.index];
   if (e.kind == Kind::sphere) {

@@ -13,7 +13,7 @@ import numpy as np
 from . import library
 from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Images, Mapping, Picture, Value, image_of, input_of
 
-HOLE = 0.25  # an opacity that the library takes as "not there"
+HOLE = 1e-3  # an opacity that the library takes as "not there"; 0 means 1 to it
 
 
 MIRROR = 0.1  # roughness below which the library follows a reflection instead of shading it
@@ -312,12 +312,7 @@ class Materials:
         if factors["emission"].any():
             m.flags |= library.EMIT_BOTH_SIDES
         opacity = float(factors["opacity"].mean())
-        if "opacity" not in pictures:
-            if 0.02 < opacity < 0.98:
-                self.report.note(f"{name} ({opacity:.2g})", "Partial transparency rounded to a hole or a solid")
-            m.opacity = HOLE if opacity < 0.5 else 1.0
-        else:
-            m.opacity = min(1.0, max(opacity, 0.01))
+        m.opacity = min(1.0, max(opacity, HOLE))
         if normals is not None:
             pictures["normal"], m.normal_strength = normals
         mappings = {p.mapping for p in pictures.values()}

@@ -248,6 +248,23 @@ TEST(Emitters, AMillionEmissiveTrianglesTakeAHundredBytesEach) {
   EXPECT_NEAR(emitters.power() / (kPi * 4 * 0.5), 1.0, 1e-4);
 }
 
+TEST(Emitters, AVeilOfLightHasTheShareOfPowerThatRaysMeet) {
+  const auto flux = [](float opacity) {
+    Scene scene{{}};
+    Material m;
+    m.emission = {2, 2, 2}, m.opacity = opacity;
+    scene.set_materials({m});
+    Mesh mesh;
+    test::add_quad(mesh, {0, 0, 0}, {2, 0, 0}, {2, 3, 0}, {0, 3, 0}, 0);
+    scene.add_mesh(mesh);
+    Progress progress;
+    scene.commit(progress);
+    return mean_flux(scene, 10);
+  };
+  EXPECT_NEAR(flux(1.0f), kPi * 6 * 2, 1e-4);  // rounding only
+  EXPECT_NEAR(flux(0.25f), 0.25 * kPi * 6 * 2, 1e-4);
+}
+
 TEST(Emitters, EmissiveTrianglesShineFromTheirFrontUnlessToldOtherwise) {
   for (bool both : {false, true}) {
     Scene scene{{}};

@@ -164,7 +164,7 @@ typedef struct lumicut_material {
   float diffuse[3];        /* kd, 0..1 */
   float shininess;         /* n, the lobe's exponent, >= 0 */
   float specular[3];       /* ks, 0..1: Blinn ks (n+2)/2pi cos^n(beta); Phong ks/2pi cos^n(beta); see docs/scene_format.md */
-  float opacity;           /* 0: not given, taken as 1; below 0.5 a hole where there is no texture */
+  float opacity;           /* share of the rays that the surface stops, times its texture; 0: not given, taken as 1; below 1/256 a hole */
   float emission[3];       /* radiance, on the side the geometric normal points to */
   int32_t diffuse_texture, specular_texture, opacity_texture, emission_texture; /* 1 + index into the textures; 0: none. Factors multiply */
   /* LUMICUT_GGX alone: diffuse is the base colour, specular multiplies the dielectric's reflectance ((ior-1)/(ior+1))^2 */
