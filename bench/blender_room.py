@@ -11,17 +11,14 @@ export_scripts/scenes/blender_indirect_room.py. CPU seconds are the process' own
 import argparse
 import contextlib
 import json
-import os
 import pathlib
 import sys
-import time
 
-sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[1] / "tests/blender"), str(pathlib.Path(__file__).resolve().parent)]
-os.environ.setdefault("LUMICUT_SOURCE_DIR", str(pathlib.Path(__file__).resolve().parents[1]))
+sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent)]
 import bpy  # noqa: E402
 import numpy as np  # noqa: E402
 
-import helpers as h  # noqa: E402
+from blender_reference import Reference, cycles, h, measured, render_parts  # noqa: E402
 import loglog_plot  # noqa: E402
 
 # What is tried for each budget at 320x240: passes grow with time.
@@ -34,46 +31,6 @@ SETTINGS = {
 }
 CURVE = {"passes": (1, 2, 4, 8, 16, 32, 64), "samples": (2, 8, 32, 128, 512, 1600)}  # `curve`
 CLAMPS = (0.03, 0.003)  # `bias`: what is lost as the clamp shrinks
-
-
-def measured(configure):
-    configure()
-    before, wall = os.times(), time.perf_counter()
-    with h.quiet():
-        image = h.radiance(h.render())
-    after = os.times()
-    return image, after.user + after.system - before.user - before.system, time.perf_counter() - wall
-
-
-class Reference:
-    """The mean of independent parts. Its own noise, known from how they differ, is taken off the errors in quadrature."""
-
-    def __init__(self, folder):
-        self.folder = folder
-        self.parts = [np.load(p) for p in sorted(folder.glob("*.npy"))]
-        self.image = np.mean(self.parts, 0)
-
-    def error(self, image, side=1):
-        """(RMSE / mean, noise of the reference / mean) of blocks of pixels: in large ones noise averages out, bias stays."""
-        a, b = h.blocks(image, side), h.blocks(self.image, side)
-        noise2 = np.mean([((h.blocks(p, side) - b) ** 2).mean() for p in self.parts]) / max(1, len(self.parts) - 1)
-        return float(np.sqrt(max(0.0, ((a - b) ** 2).mean() - noise2)) / b.mean()), float(np.sqrt(noise2) / b.mean())
-
-    def row(self, name, image, cpu, keep=True):
-        if keep:  # for `again`, with a longer reference
-            (self.folder / "rows").mkdir(exist_ok=True)
-            number = len(list((self.folder / "rows").glob("*.npz")))
-            np.savez_compressed(self.folder / "rows" / f"{number:03}.npz", image=image.astype(np.float32), name=name, cpu=cpu)
-        pixel, block = self.error(image)[0], self.error(image, 8)[0]
-        print(f"| {name} | {cpu:.1f} | {100 * pixel:.1f} % | {100 * block:.1f} % | "
-              f"{100 * (image.mean() / self.image.mean() - 1):+.1f} % |", flush=True)
-        return pixel
-
-
-def cycles(samples, seed=1, clamp=0.0, bounces=32):
-    h.set_cycles(samples, bounces)
-    bpy.context.scene.cycles.seed = seed
-    bpy.context.scene.cycles.sample_clamp_indirect = clamp
 
 
 def small(width):
@@ -165,13 +122,7 @@ def main():
         bias(options)
         return
     if options.mode == "reference":
-        for part in range(options.parts):
-            path = options.folder / f"{options.samples}_{part}.npy"
-            if path.exists():
-                continue
-            image, cpu, wall = measured(lambda: cycles(options.samples, 100 + part))
-            np.save(path, image)
-            print(f"part {part}: {cpu:.0f} CPU s, {wall:.0f} s", flush=True)
+        render_parts(options.folder, options.parts, options.samples)
         return
     reference = Reference(options.folder)
     _, noise = reference.error(reference.image)

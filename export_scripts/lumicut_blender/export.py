@@ -183,7 +183,7 @@ class Writer:
         if kind == "sun":
             out["angular_radius"] = degrees(light.radius)
         if kind in ("rectangle", "disk"):
-            out |= {"u": numbers(light.u), "v": numbers(light.v), "spread": degrees(light.spread or math.pi)}
+            out |= {"u": numbers(light.u), "v": numbers(light.v), "spread": min(180.0, degrees(light.spread or math.pi))}
         return out
 
     @staticmethod
