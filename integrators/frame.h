@@ -13,6 +13,7 @@ struct FrameOptions {
   Rect crop;  // inside width × height
   uint64_t seed = 1;
   float compensate = 0.0f;   // distance of the clamp whose loss rays bring back; 0: none [integrators/eye_rays.h]
+  bool spheres = false;      // virtual lights are: the clamp takes light of lamps alone
   bool jitter = false;       // a single sample too lies at random in its pixel
   bool illuminance = false;  // fill that channel: about as long again
 };
