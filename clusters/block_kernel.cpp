@@ -5,6 +5,7 @@
 #include "hwy/foreach_target.h"  // compiles this file once a target; before highway.h
 
 #include "clusters/light_kernel-inl.h"
+#include "clusters/sphere_integral-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
@@ -28,8 +29,15 @@ HWY_INLINE void Run(std::span<const Vpl> lights, float weight, float clamp2, con
     };
     for (const Vpl& light : lights) {
       V3 to_light;
-      const V geometry = Geometry<kKind>(d, light, clamp2, position, normal, to_light);
       const V3 intensity = Set3(d, light.intensity);
+      if constexpr (kKind == VplKind::sphere) {
+        const Parts parts = SphereParts<kLobes, true>(d, light, points, p, position, normal, to_light);
+        add_to(even, intensity, parts.diffuse);
+        if constexpr (kLobes != Lobes::none) add_to(lobed, intensity, parts.specular);
+        if constexpr (kLobes == Lobes::ggx) add_to(edge, intensity, parts.grazing);
+        continue;
+      }
+      const V geometry = Geometry<kKind>(d, light, clamp2, position, normal, to_light);
       if constexpr (kLobes == Lobes::ggx) {
         if (hn::AllFalse(d, hn::Gt(geometry, zero))) continue;
         const Parts parts = PartsTowards<kLobes>(d, points, p, normal, mirror, shininess, to_light);
@@ -93,6 +101,9 @@ void LightBlock(std::span<const Vpl> lights, float weight, float clamp2, const S
         break;
       case VplKind::spot:
         RunKind<VplKind::spot>(run, weight, clamp2, points, first, count, add, sums);
+        break;
+      case VplKind::sphere:
+        RunKind<VplKind::sphere>(run, weight, clamp2, points, first, count, add, sums);
         break;
     }
     add = true;

@@ -10,6 +10,7 @@
 
 #include "clusters/bounds-inl.h"
 #include "clusters/light_kernel-inl.h"
+#include "clusters/sphere_integral-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
@@ -35,9 +36,17 @@ HWY_INLINE uint32_t Estimate(const Vpl& light, const Rgb& intensity, float clamp
   for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
     V3 to_light;
     const V3 normal = Load3(d, block.normal, i);
-    const V geometry = Geometry<kKind>(d, light, clamp2, Load3(d, block.position, i), normal, to_light);
-    const auto reached = hn::And(hn::Gt(geometry, hn::Zero(d)), MaskOf(d, active, i));
-    const V3 f = Reflectance<kLobes>(d, block, i, normal, to_light);
+    V geometry;
+    V3 f;
+    hn::Mask<D> reached;
+    if constexpr (kKind == VplKind::sphere) {
+      f = SphereRadiance<kLobes, true>(d, light, block, i, Load3(d, block.position, i), normal, to_light);
+      geometry = hn::Set(d, 1.0f), reached = MaskOf(d, active, i);
+    } else {
+      geometry = Geometry<kKind>(d, light, clamp2, Load3(d, block.position, i), normal, to_light);
+      reached = hn::And(hn::Gt(geometry, hn::Zero(d)), MaskOf(d, active, i));
+      f = Reflectance<kLobes>(d, block, i, normal, to_light);
+    }
     const V cr = hn::IfThenElseZero(reached, hn::Mul(hn::Mul(f.x, geometry), hn::Set(d, intensity.x)));
     const V cg = hn::IfThenElseZero(reached, hn::Mul(hn::Mul(f.y, geometry), hn::Set(d, intensity.y)));
     const V cb = hn::IfThenElseZero(reached, hn::Mul(hn::Mul(f.z, geometry), hn::Set(d, intensity.z)));
@@ -66,6 +75,8 @@ HWY_NOINLINE uint32_t EstimateOf(const Vpl& light, const Rgb& intensity, float c
       return EstimateOfKind<VplKind::directional>(light, intensity, clamp2, block, active, r, g, b);
     case VplKind::spot:
       return EstimateOfKind<VplKind::spot>(light, intensity, clamp2, block, active, r, g, b);
+    case VplKind::sphere:
+      return EstimateOfKind<VplKind::sphere>(light, intensity, clamp2, block, active, r, g, b);
   }
   return 0;
 }

@@ -16,6 +16,10 @@ HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
+// One SurfacePoint in all lanes, in place of ShadePoints or a PointBlock.
+HWY_INLINE V3 Load3(D d, const Vec3f& v, size_t) { return Set3(d, v); }
+HWY_INLINE V Load1(D d, float v, size_t) { return hn::Set(d, v); }
+
 // Falloff of a spot towards `to_light`, from each point. Twin of spot_profile in vpl/vpl.h.
 HWY_INLINE V SpotFalloff(D d, const Vpl& light, const V3& light_normal, const V3& to_light) {
   const V zero = hn::Zero(d);

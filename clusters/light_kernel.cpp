@@ -7,6 +7,7 @@
 #include "hwy/foreach_target.h"  // compiles this file once a target; before highway.h
 
 #include "clusters/light_kernel-inl.h"
+#include "clusters/sphere_integral-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
@@ -44,12 +45,21 @@ HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, co
     }
     const V3 position = Load3(d, points.position, p), normal = Load3(d, points.normal, p);
     V3 to_light;
-    constexpr VplKind kShape = kScatter ? VplKind::omni : kKind;
-    V geometry = Geometry<kShape>(d, light, clamp2, position, normal, to_light);
-    if constexpr (kScatter) geometry = hn::Mul(geometry, MeanCosine(d, light.normal, *scatter, to_light));
-    const auto reached = hn::And(hn::Gt(geometry, zero), inside);
-    if (hn::AllFalse(d, reached)) continue;
-    const V3 f = Reflectance<kLobes>(d, points, p, normal, to_light);
+    V geometry;
+    V3 f;
+    hn::Mask<D> reached;
+    if constexpr (kKind == VplKind::sphere) {
+      f = SphereRadiance<kLobes, !kScatter>(d, light, points, p, position, normal, to_light);
+      geometry = kScatter ? MeanCosine(d, light.normal, *scatter, to_light) : hn::Set(d, 1.0f);
+      reached = inside;
+    } else {
+      constexpr VplKind kShape = kScatter ? VplKind::omni : kKind;
+      geometry = Geometry<kShape>(d, light, clamp2, position, normal, to_light);
+      if constexpr (kScatter) geometry = hn::Mul(geometry, MeanCosine(d, light.normal, *scatter, to_light));
+      reached = hn::And(hn::Gt(geometry, zero), inside);
+      if (hn::AllFalse(d, reached)) continue;
+      f = Reflectance<kLobes>(d, points, p, normal, to_light);
+    }
     const V r = hn::Mul(hn::Mul(f.x, geometry), hn::Set(d, intensity.x));
     const V g = hn::Mul(hn::Mul(f.y, geometry), hn::Set(d, intensity.y));
     const V b = hn::Mul(hn::Mul(f.z, geometry), hn::Set(d, intensity.z));
@@ -83,6 +93,8 @@ HWY_INLINE size_t LightKind(const Vpl& light, const Rgb& intensity, float clamp2
 
 size_t LightPoints(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
                    size_t count, LitPoints& lit, const uint16_t* wanted, const DirectionScatter* scatter) {
+  if (scatter != nullptr && light.kind == VplKind::sphere)
+    return LightKind<VplKind::sphere, true>(light, intensity, clamp2, points, first, count, lit, wanted, scatter);
   if (scatter != nullptr)
     return LightKind<VplKind::oriented, true>(light, intensity, clamp2, points, first, count, lit, wanted, scatter);
   switch (light.kind) {
@@ -94,8 +106,19 @@ size_t LightPoints(const Vpl& light, const Rgb& intensity, float clamp2, const S
       return LightKind<VplKind::directional>(light, intensity, clamp2, points, first, count, lit, wanted);
     case VplKind::spot:
       return LightKind<VplKind::spot>(light, intensity, clamp2, points, first, count, lit, wanted);
+    case VplKind::sphere:
+      return LightKind<VplKind::sphere>(light, intensity, clamp2, points, first, count, lit, wanted);
   }
   return 0;
+}
+
+Rgb SphereAt(const Vpl& light, const SurfacePoint& point) {
+  const D d;
+  V3 to_light;
+  const V3 position = Set3(d, point.position), normal = Set3(d, point.normal);
+  const V3 f = point.ggx() ? SphereRadiance<Lobes::ggx, true>(d, light, point, 0, position, normal, to_light)
+                           : SphereRadiance<Lobes::cosine, true>(d, light, point, 0, position, normal, to_light);
+  return {hn::GetLane(f.x), hn::GetLane(f.y), hn::GetLane(f.z)};
 }
 
 }  // namespace lumicut::HWY_NAMESPACE
@@ -104,6 +127,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace lumicut {
 HWY_EXPORT(LightPoints);
+HWY_EXPORT(SphereAt);
 
 void light_points(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
                   size_t count, LitPoints& lit, const uint16_t* lanes, const DirectionScatter* scatter) {
@@ -111,6 +135,7 @@ void light_points(const Vpl& light, const Rgb& intensity, float clamp2, const Sh
 }
 
 Rgb light_point(const Vpl& light, const Rgb& intensity, float clamp2, const SurfacePoint& point) {
+  if (light.kind == VplKind::sphere) return HWY_DYNAMIC_DISPATCH(SphereAt)(light, point) * intensity;
   Vec3f to_light = -light.normal;
   float geometry = 1.0f;
   if (light.kind != VplKind::directional) {

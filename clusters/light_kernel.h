@@ -42,10 +42,10 @@ inline float mean_cosine(const Vec3f& direction, const DirectionScatter& s, cons
 
 // Unshadowed radiance of `light`, with the summed intensity `intensity` in place of its own, at points
 // [first, first + count) of `points`; first a multiple of kLanes, count <= kMaxLit. Only points that get any are kept,
-// in order. `clamp2`: squared distance below which no light comes nearer. [thesis Eq. 1.1 without V]
+// in order. `clamp2`: squared distance below which no light comes nearer; spheres need none. [thesis Eq. 1.1 without V]
 // `lanes`, where given, holds a bit for each point (kLanes points a word, as many words as points need): only points
 // whose bit is set are kept.
-// `scatter`, for oriented lights: `light` is the mean of a cluster, its normal their mean direction.
+// `scatter`, for oriented lights and spheres: `light` is the mean of a cluster, its normal their mean direction.
 void light_points(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
                   size_t count, LitPoints& lit, const uint16_t* lanes = nullptr,
                   const DirectionScatter* scatter = nullptr);
@@ -59,6 +59,7 @@ inline void trace_lit(const Accel& accel, const Vpl& light, LitPoints& lit) {
 }
 
 // The same for one point, in plain arithmetic: what the kernel is tested against, and for code that is not hot.
+// Spheres: one lane of the kernel.
 Rgb light_point(const Vpl& light, const Rgb& intensity, float clamp2, const SurfacePoint& point);
 
 }  // namespace lumicut

@@ -26,8 +26,9 @@ HWY_INLINE void PairBoundsOf(const LightNode& node, const PointNodes& nodes, flo
   const V cos_half = hn::Set(d, node.cos_half), sin_half = hn::Set(d, node.sin_half);
   for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
     const V3 normal = Load3(d, nodes.normal, i);
-    V cosine, geometry;  // at the surfaces; at the lights, with the distance
-    V3 to_center = {zero, zero, zero}, half = {zero, zero, zero};
+    V cosine, geometry;            // at the surfaces; at the lights, with the distance
+    V steep = one, across = zero;  // spheres: as in bounds-inl.h
+    V3 to_center = {zero, zero, zero}, half = {zero, zero, zero}, places = half;
     if constexpr (kKind == VplKind::directional) {
       cosine = WidenByCone(d, hn::Neg(Dot(normal, axis)), cos_half, sin_half);
       geometry = one;
@@ -35,16 +36,31 @@ HWY_INLINE void PairBoundsOf(const LightNode& node, const PointNodes& nodes, flo
       const V3 points_half = Load3(d, nodes.half, i);
       to_center = Sub3(Set3(d, node.center), Load3(d, nodes.center, i));
       half = Add3(Set3(d, node.half), points_half);
-      geometry = hn::Div(one, hn::Max(hn::Max(Dist2(d, to_center, half), hn::Set(d, clamp2)), hn::Set(d, 1e-30f)));
-      if constexpr (kKind == VplKind::oriented || kKind == VplKind::spot) {
+      if constexpr (kKind == VplKind::sphere) {
+        const V dist2 = Dist2(d, to_center, half);
+        geometry = BoundOfSolidAngle(d, node, dist2), across = SpheresAcross(d, node, dist2), places = half;
+        half = GrownBySpheres(d, half, node);
+      } else {
+        geometry = hn::Div(one, hn::Max(hn::Max(Dist2(d, to_center, half), hn::Set(d, clamp2)), hn::Set(d, 1e-30f)));
+      }
+      if constexpr (kKind == VplKind::oriented || kKind == VplKind::spot || kKind == VplKind::sphere) {
         // From the lights to the points: the box turned around.
         const V3 tangent = Set3(d, node.tangent), bitangent = Set3(d, node.bitangent);
+        V3 frame_half = Set3(d, node.frame_half);
+        if constexpr (kKind == VplKind::sphere) frame_half = GrownBySpheres(d, frame_half, node);
         const V c = LargestCosine(d, hn::Neg(Dot(to_center, tangent)), hn::Neg(Dot(to_center, bitangent)),
-                                  hn::Neg(Dot(to_center, axis)),
-                                  hn::Add(hn::Set(d, node.frame_half.x), Reach(tangent, points_half)),
-                                  hn::Add(hn::Set(d, node.frame_half.y), Reach(bitangent, points_half)),
-                                  hn::Add(hn::Set(d, node.frame_half.z), Reach(axis, points_half)));
-        if constexpr (kKind == VplKind::oriented) {
+                                  hn::Neg(Dot(to_center, axis)), hn::Add(frame_half.x, Reach(tangent, points_half)),
+                                  hn::Add(frame_half.y, Reach(bitangent, points_half)),
+                                  hn::Add(frame_half.z, Reach(axis, points_half)));
+        if constexpr (kKind == VplKind::sphere) {
+          const V mean = LargestCosine(d, hn::Neg(Dot(to_center, tangent)), hn::Neg(Dot(to_center, bitangent)),
+                                       hn::Neg(Dot(to_center, axis)),
+                                       hn::Add(hn::Set(d, node.frame_half.x), Reach(tangent, points_half)),
+                                       hn::Add(hn::Set(d, node.frame_half.y), Reach(bitangent, points_half)),
+                                       hn::Add(hn::Set(d, node.frame_half.z), Reach(axis, points_half)));
+          geometry = hn::Mul(geometry, MeanOverSpheres(d, WidenByCone(d, mean, cos_half, sin_half), across));
+          geometry = hn::IfThenElseZero(hn::Gt(WidenByCone(d, c, cos_half, sin_half), zero), geometry);
+        } else if constexpr (kKind == VplKind::oriented) {
           geometry = hn::Mul(geometry, hn::Max(zero, WidenByCone(d, c, cos_half, sin_half)));
         } else {
           geometry = hn::IfThenElseZero(hn::Ge(hn::Add(c, hn::Set(d, 1e-5f)), cos_half), geometry);
@@ -53,7 +69,15 @@ HWY_INLINE void PairBoundsOf(const LightNode& node, const PointNodes& nodes, flo
       cosine = CosineToBox(d, to_center, half, Load3(d, nodes.tangent, i), Load3(d, nodes.bitangent, i), normal);
     }
     cosine = WidenByCone(d, cosine, hn::Load(d, nodes.normal_cos + i), hn::Load(d, nodes.normal_sin + i));
-    geometry = hn::Mul(geometry, hn::Max(zero, cosine));
+    if constexpr (kKind == VplKind::sphere) {
+      V mean = CosineToBox(d, to_center, places, Load3(d, nodes.tangent, i), Load3(d, nodes.bitangent, i), normal);
+      mean = WidenByCone(d, mean, hn::Load(d, nodes.normal_cos + i), hn::Load(d, nodes.normal_sin + i));
+      mean = MeanOverSpheres(d, mean, across);
+      geometry = hn::IfThenElseZero(hn::Gt(cosine, zero), hn::Mul(geometry, mean));
+      steep = hn::Div(hn::Max(zero, cosine), hn::Max(mean, hn::Set(d, 1e-20f)));
+    } else {
+      geometry = hn::Mul(geometry, hn::Max(zero, cosine));
+    }
     V3 f = Load3(d, nodes.diffuse, i);
     if constexpr (kLobes != Lobes::none) {
       const V3 mirror = Load3(d, nodes.mirror, i), specular = Load3(d, nodes.specular, i);
@@ -70,8 +94,9 @@ HWY_INLINE void PairBoundsOf(const LightNode& node, const PointNodes& nodes, flo
       if constexpr (kLobes == Lobes::ggx) {
         V3 gloss{hn::Mul(specular.x, lobe), hn::Mul(specular.y, lobe), hn::Mul(specular.z, lobe)};
         const V nv = hn::Load(d, nodes.view_cosine + i);
-        const V ggx =
+        V ggx =
             BoundOfGgxLobe(d, beta, cosine, hn::Load(d, nodes.alpha2_low + i), hn::Load(d, nodes.alpha2_high + i), nv);
+        if constexpr (kKind == VplKind::sphere) ggx = hn::Mul(ggx, steep);
         const V3 share =
             BoundOfSchlick(d, Load3(d, nodes.schlick, i), Load3(d, nodes.grazing, i), BoundOfFresnel(d, beta, nv));
         // A point has one of the two lobes.
@@ -102,6 +127,8 @@ void PairBounds(const LightNode& node, const PointNodes& nodes, float clamp2, fl
       return PairBoundsOfKind<VplKind::directional>(node, nodes, clamp2, bounds);
     case VplKind::spot:
       return PairBoundsOfKind<VplKind::spot>(node, nodes, clamp2, bounds);
+    case VplKind::sphere:
+      return PairBoundsOfKind<VplKind::sphere>(node, nodes, clamp2, bounds);
   }
 }
 

@@ -24,6 +24,7 @@ uint64_t spread_bits(uint64_t x) {
 
 // How unlike two lights shine: the distance of their normals; more than any such where they are of different make.
 float unlike2(const Vpl& a, const Vpl& b) {
+  if (a.kind == VplKind::sphere && b.kind == VplKind::sphere) return length2(a.normal - b.normal);
   if (a.kind != b.kind || a.cos_outer != b.cos_outer || a.blend_cosine != b.blend_cosine ||
       a.spot_cosine != b.spot_cosine || a.spread_tan != b.spread_tan)
     return 9.0f;
@@ -32,7 +33,7 @@ float unlike2(const Vpl& a, const Vpl& b) {
 
 // One light in place of several: mean position and normal, weighted by intensity, and their sum.
 Vpl mean_light(std::span<const Vpl> lights, const std::vector<uint8_t>& group_of, uint8_t group) {
-  double position[3] = {}, normal[3] = {}, intensity[3] = {}, total = 0;
+  double position[3] = {}, normal[3] = {}, intensity[3] = {}, radius = 0, total = 0;
   const Vpl* strongest = nullptr;
   for (size_t i = 0; i < lights.size(); ++i) {
     if (group_of[i] != group) continue;
@@ -42,10 +43,12 @@ Vpl mean_light(std::span<const Vpl> lights, const std::vector<uint8_t>& group_of
       position[k] += w * v.position[k], normal[k] += w * v.normal[k],
           intensity[k] += static_cast<double>(v.intensity[k]);
     }
+    radius += w * v.cos_outer;
     total += w;
     if (strongest == nullptr || luminance(v.intensity) > luminance(strongest->intensity)) strongest = &v;
   }
   Vpl out = *strongest;
+  if (out.kind == VplKind::sphere) out.cos_outer = static_cast<float>(radius / total);
   const double length_of_normal = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
   for (int k = 0; k < 3; ++k) {
     out.position[k] = static_cast<float>(position[k] / total);
@@ -62,6 +65,7 @@ float cosine_towards(const Vpl& v, const Vec3f& direction) {
     case VplKind::omni:
       return 1.0f;
     case VplKind::oriented:
+    case VplKind::sphere:
       return std::max(0.0f, c);
     case VplKind::spot:
       return spot_profile(v, direction);
@@ -171,6 +175,8 @@ void WspdTree::find_balls(Progress& progress) {
       for (uint32_t i = node.first; i < node.last; ++i) {
         box.extend(place(i));
         power += static_cast<double>(luminance(lights_[i].intensity));
+        if (lights_[i].kind == VplKind::sphere)
+          node.largest_sphere = std::max(node.largest_sphere, lights_[i].radius());
       }
       node.center = node.last - node.first == 1 ? place(node.first) : box.center();
       float radius2 = 0.0f;

@@ -28,10 +28,11 @@ struct WspdNode {
   uint32_t parent = kNone;
   uint32_t first_group = 0, group_count = 0;  // subgroups of like normals; none where no pair can use the node
   uint32_t cubemap = kNone;                   // kNone: all its lights reach its ball
+  float largest_sphere = 0.0f;                // radius, of its lights that are spheres
 
   bool leaf() const { return child_count == 0; }
 };
-static_assert(sizeof(WspdNode) == 52);
+static_assert(sizeof(WspdNode) == 56);
 
 // Directions of a cubemap: six faces of 6 x 6 cells. [thesis sec. 2.3]
 inline constexpr size_t kCubeSide = 6, kCubeCells = 6 * kCubeSide * kCubeSide;

@@ -6,9 +6,10 @@
 
 namespace lumicut {
 
-EyeRays::EyeRays(const Scene& scene, float distance, uint64_t seed)
+EyeRays::EyeRays(const Scene& scene, float distance, bool spheres, uint64_t seed)
     : scene_(scene),
       distance_(distance),
+      spheres_(spheres),
       seed_(seed),
       emitters_(scene),
       lamps_(scene, emitters_, distance),
@@ -96,7 +97,8 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
     // Mirrors and glass show it what is behind them: no virtual light shines by way of those.
     if (auto ray = start_chain(scene_, surface, to_viewer, weights[i], pixels[i], rngs[i])) chains.push_back(*ray);
     SurfacePoint point = scene_.shade_point(surface, to_viewer, pixels[i]);
-    point.diffuse = point.diffuse * lost;
+    // Spheres stand for all that is reflected evenly.
+    point.diffuse = point.diffuse * (spheres_ ? 0.0f : lost);
     // Chance decides by what the surface still shows, so that few points cost a whole sum of lights.
     const Rgb shown = Bsdf(point).albedo() * weights[i];
     const float survive = std::min(1.0f, max_component(shown));

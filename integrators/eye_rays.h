@@ -15,8 +15,9 @@ namespace lumicut {
 
 class EyeRays {
  public:
-  // `distance`: that of the clamp, above 0. Scene outlives this.
-  EyeRays(const Scene& scene, float distance, uint64_t seed);
+  // `distance`: that of the clamp, above 0. `spheres`: virtual lights on surfaces are, and lose nothing by it. Scene
+  // outlives this.
+  EyeRays(const Scene& scene, float distance, bool spheres, uint64_t seed);
 
   // One ray from each point (unless it is cut short by chance, or the point is black), one sample of each near lamp,
   // and one of all emissive meshes. `level` counts the surfaces since the camera. Deterministic: numbers belong to the places of points.
@@ -29,6 +30,7 @@ class EyeRays {
 
   const Scene& scene_;
   const float distance_;
+  const bool spheres_;
   const uint64_t seed_;
   Emitters emitters_;
   NearLamps lamps_;

@@ -119,7 +119,9 @@ class IlluminationCut final : public Integrator {
     // The profile of a spot is bent too much for means.
     if (node.kind == VplKind::spot) return r;
     r.shining.position = mean.place;
-    if (node.kind == VplKind::oriented) r.shining.normal = mean.direction, r.scatter = &mean.scatter;
+    if (node.kind == VplKind::sphere) r.shining.cos_outer = mean.radius;
+    if (node.kind == VplKind::oriented || node.kind == VplKind::sphere)
+      r.shining.normal = mean.direction, r.scatter = &mean.scatter;
     return r;
   }
 
@@ -133,8 +135,10 @@ class IlluminationCut final : public Integrator {
     const Vec3f v = mean.place - position;
     const float dist2 = std::max(length2(v), 1e-30f);
     const Vec3f to_light = v / std::sqrt(dist2);
-    const float cosine = node.kind == VplKind::oriented ? mean_cosine(mean.direction, mean.scatter, to_light) : 1.0f;
-    return light * cosine * std::max(kHorizon, dot(normal, to_light)) / std::max(dist2, clamp2_);
+    const bool faces = node.kind == VplKind::oriented || node.kind == VplKind::sphere;
+    const float cosine = faces ? mean_cosine(mean.direction, mean.scatter, to_light) : 1.0f;
+    const float least2 = node.kind == VplKind::sphere ? mean.radius * mean.radius : clamp2_;
+    return light * cosine * std::max(kHorizon, dot(normal, to_light)) / std::max(dist2, least2);
   }
 
   // One of a node's lights, drawn in proportion to about what each gives to the point. The mean shines for all of them:
@@ -161,7 +165,7 @@ class IlluminationCut final : public Integrator {
       Mean& mean = means_[n];
       if (node.leaf()) {
         const Vpl& light = tree_.lights()[node.light];
-        mean = {light.position, light.normal, {}, node.light};
+        mean = {light.position, light.normal, {}, node.light, light.kind == VplKind::sphere ? light.radius() : 0.0f};
         continue;
       }
       const uint32_t left = node.first_child, right = left + 1;
@@ -169,6 +173,7 @@ class IlluminationCut final : public Integrator {
       const float share = l + r > 0.0f ? l / (l + r) : 0.5f;
       mean.place = means_[left].place * share + means_[right].place * (1.0f - share);
       mean.direction = means_[left].direction * share + means_[right].direction * (1.0f - share);
+      mean.radius = means_[left].radius * share + means_[right].radius * (1.0f - share);
       const float size2 = std::max(length2(node.half), 1e-30f);
       const DirectionScatter &a = means_[left].scatter, &b = means_[right].scatter;
       const Vec3f apart = means_[left].direction - means_[right].direction;
@@ -584,6 +589,7 @@ class IlluminationCut final : public Integrator {
     Vec3f place, direction;
     DirectionScatter scatter;
     uint32_t light = 0;  // the central one
+    float radius = 0.0f;
   };
   std::vector<Mean> means_;  // a node; empty: the tree's own representatives serve
   float clamp2_ = 0.0f, error_ = 0.02f, floor_ = 0.01f, separation2_ = 0.0225f;

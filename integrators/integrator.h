@@ -96,10 +96,13 @@ const IntegratorEntry* find_integrator(const std::string& id);
 // common_params() and the integrator's own.
 std::vector<ParamInfo> all_params(const IntegratorEntry& entry);
 
-// vpls, seed, max_depth, direct_share, clamp_relative, clamp_distance: what every method understands.
+// vpls, seed, max_depth, direct_share, clamp_relative, clamp_distance and such: what every method understands.
 std::vector<ParamInfo> common_params();
 
 // Distance below which no light comes nearer, in scene units: clamp_distance, or clamp_relative of the scene's radius.
 float clamp_distance(const Params& params, const Scene& scene);
+
+// sphere_scale where virtual lights are spheres, 0 where they are points.
+float sphere_scale(const Params& params);
 
 }  // namespace lumicut

@@ -106,6 +106,12 @@ std::vector<ParamInfo> common_params() {
       {"clamp_distance", "Clamp distance",
        "No virtual light is taken to be nearer than this; 0: use the relative clamp", "scene units", ParamType::real,
        "0", 0, 1e30},
+      {"virtual_lights", "Virtual lights are",
+       "points, which leave bright dots on glossy surfaces and in corners; or spheres as wide as they lie apart: no "
+       "dots and nothing clamped, at the price of a slight blur and slower shading",
+       "", ParamType::choice, "points", 0, 0, "points|spheres"},
+      {"sphere_scale", "Sphere size", "Radius of the spheres", "of the distance to the tenth nearest", ParamType::real,
+       "1", 0.001, 10},
       {"compensate", "Compensate",
        "Rays bring back the light that the clamp takes away, and what glossy surfaces throw on others: no energy is "
        "lost, "
@@ -117,6 +123,10 @@ std::vector<ParamInfo> common_params() {
 float clamp_distance(const Params& params, const Scene& scene) {
   const double absolute = params.real("clamp_distance");
   return static_cast<float>(absolute > 0.0 ? absolute : params.real("clamp_relative") * scene.radius());
+}
+
+float sphere_scale(const Params& params) {
+  return params.choice("virtual_lights") == "spheres" ? static_cast<float>(params.real("sphere_scale")) : 0.0f;
 }
 
 }  // namespace lumicut

@@ -168,7 +168,8 @@ class StochasticLightcuts final : public Integrator {
       const LightNode& node = tree_.node(index);
       if (node.kind == VplKind::directional) break;
       const Vec3f to_center = node.center - point.position;
-      if (length2(node.half) < kSmall2 * std::max(length2(to_center), clamp2_)) break;
+      const float least2 = node.kind == VplKind::sphere ? node.least_radius * node.least_radius : clamp2_;
+      if (length2(node.half) < kSmall2 * std::max(length2(to_center), least2)) break;
       const Weights a = weights(tree_.node(node.first_child), point),
                     b = weights(tree_.node(node.first_child + 1), point);
       // By the nearest and by the farthest that the children may be: half of each. [Yuksel 2019, sec. 4.2]
@@ -199,7 +200,8 @@ class StochasticLightcuts final : public Integrator {
   // only where no light of the node can give anything.
   Weights weights(const LightNode& node, const SurfacePoint& point) const {
     const Vec3f v = node.center - point.position;
-    const float radius = length(node.half), distance = length(v);
+    // Spheres shine from all around their centres.
+    const float radius = length(node.half) + node.largest_radius, distance = length(v);
     const float reach = 1.0f / std::max(std::max(distance, radius), 1e-30f);
     const auto best_cosine = [&](const Vec3f& axis) { return std::min(1.0f, (dot(axis, v) + radius) * reach + 1e-5f); };
     const float cosine = best_cosine(point.normal);
@@ -214,7 +216,7 @@ class StochasticLightcuts final : public Integrator {
       if (beta > 0.0f) reflected += specular * std::pow(beta, point.shininess);
     }
     float emitted = 1.0f;
-    if (node.kind == VplKind::oriented && distance > radius) {
+    if ((node.kind == VplKind::oriented || node.kind == VplKind::sphere) && distance > radius) {
       const float c = -dot(node.axis, v) / distance;
       const float wide =
           c >= node.cos_half ? 1.0f : c * node.cos_half + std::sqrt(std::max(0.0f, 1.0f - c * c)) * node.sin_half;
@@ -222,8 +224,9 @@ class StochasticLightcuts final : public Integrator {
       if (!(emitted > 0.0f)) return {0.0f, 0.0f};
     }
     const Vec3f a{std::abs(v.x), std::abs(v.y), std::abs(v.z)};
-    const float near2 = std::max(length2(max(a - node.half, Vec3f{})), clamp2_),
-                far2 = std::max(length2(a + node.half), clamp2_);
+    const float least2 = node.kind == VplKind::sphere ? node.least_radius * node.least_radius : clamp2_;
+    const float near2 = std::max(length2(max(a - node.half, Vec3f{})), least2),
+                far2 = std::max(length2(a + node.half), least2);
     const float w = luminance(node.intensity) * cosine * reflected * emitted;
     return {w / std::max(near2, 1e-30f), w / std::max(far2, 1e-30f)};
   }

@@ -111,7 +111,7 @@ void Blocks::close(const ShadePoints& in) {
 // True where all of the ball lies behind the surface of every point of the block.
 bool behind(const Blocks::Block& b, const WspdNode& n) {
   const Vec3f to = n.center - b.box.center();
-  const float reach = n.radius + 0.5f * b.box.diagonal(), distance = length(to);
+  const float reach = n.radius + n.largest_sphere + 0.5f * b.box.diagonal(), distance = length(to);
   if (!(distance > reach)) return false;
   const float sine = std::sqrt(std::max(0.0f, 1.0f - b.cos_half * b.cos_half));
   // Largest dot(normal, to): to's angle to the axis less the cone's half-angle.

@@ -39,7 +39,7 @@ bool all_finite(const float* values, int n) {
 void check(const std::string& path, uint64_t index, lumicut_vpl& light) {
   const auto fail = [&](const std::string& text) { throw FileError(path, fmt::format("light {}: {}", index, text)); };
   const auto shown = [](const float* v) { return fmt::format("({}, {}, {})", v[0], v[1], v[2]); };
-  if (light.kind > LUMICUT_VPL_SPOT) fail(fmt::format("kind is {}, but must be 0 to 3", light.kind));
+  if (light.kind > LUMICUT_VPL_SPHERE) fail(fmt::format("kind is {}, but must be 0 to 4", light.kind));
   if (light.kind != LUMICUT_VPL_DIRECTIONAL && !all_finite(light.position, 3))
     fail("position is " + shown(light.position));
   for (const float i : light.intensity)
@@ -47,6 +47,8 @@ void check(const std::string& path, uint64_t index, lumicut_vpl& light) {
       fail("intensity is " + shown(light.intensity) + ", but must be finite and not negative");
   if (light.kind != LUMICUT_VPL_SPOT) light.profile = 0;
   if (!all_finite(&light.cos_outer, 4)) fail("the spot cone is not finite");
+  if (light.kind == LUMICUT_VPL_SPHERE && !(light.cos_outer > 0))
+    fail(fmt::format("the sphere's radius is {}, but must be above 0", light.cos_outer));
   if (light.kind == LUMICUT_VPL_OMNI) return;
   double length = 0;
   for (const float n : light.normal) length += double{n} * n;

@@ -15,7 +15,7 @@ using namespace lumicut;
 namespace {
 
 constexpr char kMagic[8] = {'L', 'U', 'M', 'I', 'C', 'U', 'T', 'S'};
-constexpr uint32_t kVersion = 1, kByteOrder = 0x01020304u;
+constexpr uint32_t kVersion = 2, kByteOrder = 0x01020304u;
 
 // Followed by the integrator's id, its parameters as text, the lights, and the method's own bytes.
 struct Header {
@@ -121,6 +121,7 @@ void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uin
   at += h.lights * sizeof(Vpl);
   for (const Vpl& v : vpls->lights)
     if (static_cast<uint32_t>(v.kind) >= kVplKinds || !is_finite(v.position) || !is_finite(v.normal) ||
+        (v.kind == VplKind::sphere && !(v.radius() > 0.0f && std::isfinite(v.radius()))) ||
         (v.profile != 0 && find_profile(v.profile) == nullptr))
       fail_bytes("a light in it makes no sense");
 

@@ -343,7 +343,7 @@ VplSet to_vpls(const lumicut_vpl* lights, uint64_t count) {
   for (uint64_t i = 0; i < count; ++i) {
     const lumicut_vpl& in = lights[i];
     const Checked c("lumicut_vpl", i);
-    c.integer("kind", in.kind, LUMICUT_VPL_OMNI, LUMICUT_VPL_SPOT);
+    c.integer("kind", in.kind, LUMICUT_VPL_OMNI, LUMICUT_VPL_SPHERE);
     c.integer("group", in.group, 0, kMaxGroup);
     c.not_negative("intensity", in.intensity);
     if (in.profile != 0 && in.kind != LUMICUT_VPL_SPOT) c.fail("profile", "only spots have one");
@@ -372,6 +372,9 @@ VplSet to_vpls(const lumicut_vpl* lights, uint64_t count) {
         c.fail("blend", "with spot_cosine and spread_tan is no unit vector orthogonal to the normal");
       vpl.cos_outer = in.cos_outer, vpl.profile = in.profile;
       vpl.blend_cosine = in.blend, vpl.spot_cosine = in.spot_cosine, vpl.spread_tan = in.spread_tan;
+    } else if (vpl.kind == VplKind::sphere) {
+      c.range("cos_outer", in.cos_outer, std::numeric_limits<float>::min(), std::numeric_limits<float>::max());
+      vpl.cos_outer = in.cos_outer;
     } else if (vpl.kind == VplKind::spot) {
       c.range("cos_outer", in.cos_outer, -1.0f, 1.0f);
       c.range("blend", in.blend, 0.0f, 2.0f);

@@ -113,6 +113,7 @@ VplOptions vpl_options(const Params& params) {
   o.environment_count = static_cast<uint32_t>(params.integer("environment_vpls"));
   o.max_depth = static_cast<uint32_t>(params.integer("max_depth"));
   o.seed = static_cast<uint64_t>(params.integer("seed"));
+  o.sphere_scale = sphere_scale(params);
   return o;
 }
 
@@ -126,7 +127,8 @@ std::string params_text(const Params& params) {
 
 std::string tracing_key(const Params& params) {
   std::string out;
-  for (const char* name : {"vpls", "direct_share", "environment_vpls", "max_depth", "seed"})
+  for (const char* name :
+       {"vpls", "direct_share", "environment_vpls", "max_depth", "seed", "virtual_lights", "sphere_scale"})
     out += std::string(name) + "=" + *params.text(name) + "\n";
   return out;
 }
@@ -144,6 +146,12 @@ void lumicut_scene_t::require_committed() const {
 
 void lumicut_integrator_t::prepare(lumicut_scene_t& of, const Params& with, Progress& progress, Stats& into) {
   if (of.device.get() != device.get()) fail_argument("lumicut_scene: it belongs to another device than the integrator");
+  if (host_lights != nullptr && sphere_scale(with) > 0.0f &&
+      std::none_of(host_lights->lights.begin(), host_lights->lights.end(),
+                   [](const Vpl& v) { return v.kind == VplKind::sphere; }))
+    fail_argument(
+        "parameter virtual_lights: spheres are made of lights that the library traced; the host set its own, and none "
+        "is a sphere");
   const std::string all = params_text(with);
   const std::string tracing = tracing_key(with);
   const bool same_scene =

@@ -31,8 +31,11 @@ Params params_of_pass(const Params& params, uint32_t pass, const Scene& scene) {
   if (pass == 0) return of;
   const auto seed = static_cast<uint64_t>(params.integer("seed"));
   of.set("seed", number_text(uint64_t{hash64(seed, pass) & 0xffffffffu}));
+  const double shrink = std::pow(pass + 1.0, -0.25);
+  if (const double scale = sphere_scale(params) * shrink; scale > 0.0)
+    of.set("sphere_scale", number_text(std::max(scale, 0.001)));
   if (!params.boolean("compensate")) {
-    const double clamp = clamp_distance(params, scene) * std::pow(pass + 1.0, -0.25);
+    const double clamp = clamp_distance(params, scene) * shrink;
     if (clamp > 0.0) of.set("clamp_distance", number_text(clamp));
   }
   return of;

@@ -26,7 +26,7 @@ inline constexpr uint32_t kMinPassesForError = 8;
 
 // Parameters of pass `pass` (0 is the first, which has them unchanged): lights of its own, and where nothing
 // compensates the clamp, one that shrinks with the fourth root of the passes, so that its loss and the noise it hides
-// vanish together.
+// vanish together. Spheres shrink in the same way.
 Params params_of_pass(const Params& params, uint32_t pass, const Scene& scene);
 
 // True after `done` passes of which the last took `last_seconds`.

@@ -72,6 +72,7 @@ FrameOptions lumicut_render_t::frame_options(const Prepared& prepared) const {
   frame.seed = static_cast<uint64_t>(prepared.params->integer("seed"));
   if (prepared.params->boolean("compensate") && integrator_->entry.light_source == LightSource::virtual_lights)
     frame.compensate = clamp_distance(*prepared.params, scene_->scene);
+  frame.spheres = sphere_scale(*prepared.params) > 0.0f;
   return frame;
 }
 

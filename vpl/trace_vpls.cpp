@@ -8,6 +8,7 @@
 #include "scene/bsdf.h"
 #include "scene/followed.h"
 #include "vpl/emitters.h"
+#include "vpl/sphere_radii.h"
 
 namespace lumicut {
 
@@ -213,22 +214,27 @@ VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progr
     for (uint64_t i = 0; i < direct; ++i) {
       if (i % 4096 == 0) progress.check();
       Rng rng(options.seed, Stage::light_path, i, 1);
-      const Vpl v =
-          emitters.sample_direct((static_cast<double>(i) + rng.next_float()) / static_cast<double>(direct), direct, rng);
+      const Vpl v = emitters.sample_direct((static_cast<double>(i) + rng.next_float()) / static_cast<double>(direct),
+                                           direct, rng);
       if (max_component(v.intensity) > 0.0f && is_finite(v.intensity)) set.lights.push_back(v);
     }
     progress.advance(direct + environment);
   }
   const uint64_t indirect = options.count > set.lights.size() ? options.count - set.lights.size() : 0;
-  if (indirect > 0 && options.max_depth > 0 && !scene.bounds().empty())
+  if (indirect > 0 && options.max_depth > 0 && !scene.bounds().empty()) {
+    const size_t first = set.lights.size();
     trace_indirect(scene, emitters, options, indirect, progress, set);
+    if (options.sphere_scale > 0.0f)
+      make_spheres(std::span(set.lights).subspan(first), options.sphere_scale, scene.radius());
+    progress.check();
+  }
   return set;
 }
 
 VplSet off_surfaces(const VplSet& set, const Scene& scene) {
   VplSet moved = set;
   for (Vpl& v : moved.lights)
-    if (v.kind == VplKind::oriented) v.position += v.normal * scene.epsilon();
+    if (v.kind == VplKind::oriented || v.kind == VplKind::sphere) v.position += v.normal * scene.epsilon();
   return moved;
 }
 

@@ -16,13 +16,15 @@ struct VplOptions {
       0;                    // of them for the environment, not above `count`; 0: a part of the direct ones by power
   uint32_t max_depth = 32;  // surfaces a light path may meet
   uint64_t seed = 1;
+  float sphere_scale = 0.0f;  // above 0: traced lights are spheres, with radii of so many times the distance to their
+                              // tenth neighbour [vpl/sphere_radii.h]
 };
 
 // Energy is normalised by the number of light paths. Deterministic. A scene without emitters gives no lights.
 VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progress);
 
-// The same lights with oriented ones moved off their surface by the scene's epsilon, so that shadow rays can start
-// there. Traced lights and a host's own lie on their surfaces.
+// The same lights with oriented ones and spheres moved off their surface by the scene's epsilon, so that shadow rays
+// can start there. Traced lights and a host's own lie on their surfaces.
 VplSet off_surfaces(const VplSet& set, const Scene& scene);
 
 }  // namespace lumicut

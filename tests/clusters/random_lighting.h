@@ -41,6 +41,7 @@ inline Vpl random_light(Rng& rng, VplKind kind, float half) {
   v.position = random_point(rng, half);
   v.normal = kind == VplKind::omni ? Vec3f{} : random_direction(rng);
   v.intensity = {rng.next_float(), rng.next_float(), rng.next_float()};
+  if (kind == VplKind::sphere) v.cos_outer = std::pow(10.0f, 0.3f - 2.3f * rng.next_float());
   if (kind == VplKind::spot) {
     v.cos_outer = 1.6f * rng.next_float() - 0.8f;
     v.blend_cosine = rng.next_below(3) == 0 ? 0.0f : (1.0f - v.cos_outer) * rng.next_float();

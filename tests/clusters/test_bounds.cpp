@@ -10,7 +10,7 @@ TEST(Bounds, AMillionRandomPairsNeverPassTheBoundOfTheirCluster) {
   uint64_t pairs = 0, tight = 0, zero_bounds = 0;
   for (uint32_t trial = 0; pairs < 1200000; ++trial) {
     Rng rng(trial, Stage::test);
-    const auto kind = static_cast<VplKind>(trial % 4);
+    const auto kind = static_cast<VplKind>(trial % kVplKinds);
     const bool glossy = rng.next_below(2) == 0;
     const std::vector<Vpl> lights = test::random_cluster(rng, kind, 2 + rng.next_below(40));
     const ShadePoints points = test::random_points(rng, kLanes, 1.5f, glossy);
@@ -97,10 +97,49 @@ TEST(Bounds, OfGgxAreAboutAsNearAsThoseOfBlinnLobesOfItsWidth) {
   }
 }
 
+TEST(Bounds, OfSpheresAreAboutAsNearAsThoseOfPoints) {
+  for (const bool glossy : {false, true}) {
+    double ratio[2];
+    for (const bool spheres : {false, true}) {
+      double sum = 0;
+      uint64_t pairs = 0;
+      for (uint32_t trial = 0; trial < 3000; ++trial) {
+        Rng rng(trial, Stage::test, 22);
+        std::vector<Vpl> lights = test::random_cluster(rng, VplKind::oriented, 6);
+        const float radius = 0.02f + 0.2f * rng.next_float();
+        for (Vpl& v : lights)
+          if (spheres) v.kind = VplKind::sphere, v.cos_outer = radius * (1.0f + rng.next_float());
+        const ShadePoints points = test::random_points(rng, kLanes, 1.5f, glossy);
+        PointBlock block;
+        block.load(points, 0);
+        Progress progress;
+        const LightTree tree = LightTree::build(lights, {LightTree::Method::agglomerative, 4.0f, 1, trial}, progress);
+        const LightNode& root = tree.node(tree.roots()[0]);
+        float bounds[kLanes];
+        light_node_bounds(root, block, 0.04f, bounds);
+        for (size_t i = 0; i < kLanes; ++i) {
+          float most = 0;
+          for (const Vpl& light : lights)
+            most = std::max(most, luminance(light_point(light, root.intensity, 0.04f, points.get(i))));
+          if (!(most > 1e-4f)) continue;
+          sum += std::log(bounds[i] / most);
+          ++pairs;
+        }
+      }
+      ratio[spheres] = std::exp(sum / static_cast<double>(pairs));
+    }
+    RecordProperty(glossy ? "glossy" : "diffuse",
+                   "points " + std::to_string(ratio[0]) + ", spheres " + std::to_string(ratio[1]));
+    std::printf("bound over value, %s: points %.2f, spheres %.2f\n", glossy ? "glossy" : "diffuse", ratio[0], ratio[1]);
+    // A lobe counts with its largest value in the cone, not its mean.
+    EXPECT_LT(ratio[1], (glossy ? 2.5 : 1.6) * ratio[0]) << glossy;
+  }
+}
+
 TEST(Bounds, DoNotDependOnTheScaleOfTheScene) {
   for (uint32_t trial = 0; trial < 200; ++trial) {
     Rng rng(trial, Stage::test, 7);
-    const auto kind = static_cast<VplKind>(trial % 4);
+    const auto kind = static_cast<VplKind>(trial % kVplKinds);
     std::vector<Vpl> lights = test::random_cluster(rng, kind, 8);
     ShadePoints points = test::random_points(rng, kLanes, 1.5f, true);
     float bounds[2][kLanes];
@@ -108,7 +147,7 @@ TEST(Bounds, DoNotDependOnTheScaleOfTheScene) {
       const float s = scaled ? 1024.0f : 1.0f;  // a power of two: no rounding of its own
       if (scaled) {
         for (Vpl& v : lights)
-          v.position = v.position * s,
+          v.position = v.position * s, v.cos_outer *= kind == VplKind::sphere ? s : 1.0f,
           v.intensity = v.kind == VplKind::directional ? v.intensity : v.intensity * (s * s);
         for (auto& axis : points.position)
           for (float& x : axis) x *= s;

@@ -10,7 +10,7 @@ TEST(LightKernel, EqualsPlainArithmeticForEveryKindOfLightAndMaterial) {
     for (uint32_t trial = 0; trial < 400; ++trial) {
       Rng rng(trial, Stage::test, glossy);
       const ShadePoints points = test::random_points(rng, 1 + rng.next_below(kMaxLit), 1.0f, glossy);
-      const Vpl light = test::random_light(rng, static_cast<VplKind>(trial % 4), 1.5f);
+      const Vpl light = test::random_light(rng, static_cast<VplKind>(trial % kVplKinds), 1.5f);
       const float clamp2 = 0.01f;
       auto lit = std::make_unique<LitPoints>();
       light_points(light, light.intensity, clamp2, points, 0, points.size(), *lit);

@@ -37,7 +37,7 @@ TEST(PairBounds, AMillionRandomPairsNeverPassTheBoundOfTheirClusters) {
   uint64_t pairs = 0, tight = 0, zero_bounds = 0;
   for (uint32_t trial = 0; pairs < 1200000; ++trial) {
     Rng rng(trial, Stage::test, 11);
-    const auto kind = static_cast<VplKind>(trial % 4);
+    const auto kind = static_cast<VplKind>(trial % kVplKinds);
     const std::vector<Vpl> lights = test::random_cluster(rng, kind, 2 + rng.next_below(24));
     const size_t used = 1 + rng.next_below(kLanes);
     const bool glossy = rng.next_below(2) == 0;

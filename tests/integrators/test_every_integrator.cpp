@@ -41,6 +41,27 @@ TEST_P(EveryIntegrator, GivesTheSameImageOnOneAndFourThreads) {
   EXPECT_EQ(std::memcmp(one.radiance.data(), four.radiance.data(), one.radiance.size() * sizeof(Rgb)), 0);
 }
 
+TEST_P(EveryIntegrator, IsAsNearToTheSumOfSpheresAsToThatOfPoints) {
+  if (find_integrator(GetParam())->light_source == LightSource::emitters) GTEST_SKIP() << "has no virtual lights";
+  const auto scene = test::make_room();
+  double error[2];
+  for (const bool spheres : {false, true}) {
+    const VplSet vpls = test::lights_of(*scene, 1500, 1, spheres ? 1.0f : 0.0f);
+    const auto truth = test::render(*scene, "exhaustive", vpls, {}), own = test::render(*scene, GetParam(), vpls, {});
+    error[spheres] = test::mean_relative_error(own.radiance, truth.radiance);
+  }
+  RecordProperty("error", std::to_string(error[0]) + " of points, " + std::to_string(error[1]) + " of spheres");
+  EXPECT_LT(error[1], 1.25 * error[0] + 0.005);
+}
+
+TEST_P(EveryIntegrator, GivesTheSameImageOfSpheresOnOneAndFourThreads) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 700, 1, 1.0f);
+  const auto one = test::render(*scene, GetParam(), vpls, {}, 48, 32, 1, 1),
+             four = test::render(*scene, GetParam(), vpls, {}, 48, 32, 1, 4);
+  EXPECT_EQ(std::memcmp(one.radiance.data(), four.radiance.data(), one.radiance.size() * sizeof(Rgb)), 0);
+}
+
 TEST_P(EveryIntegrator, ScaleOfTheSceneChangesNothing) {
   const auto image = [&](float scale) {
     const auto scene = test::make_room(scale);

@@ -30,7 +30,7 @@ TEST(VplFile, LightsComeBackBitForBit) {
     auto& l = lights[static_cast<size_t>(i)] = oriented(0.1f * static_cast<float>(i));
     const float a = static_cast<float>(i);
     l.normal[0] = std::sin(a), l.normal[1] = std::cos(a);
-    l.kind = static_cast<uint32_t>(i % 4);
+    l.kind = static_cast<uint32_t>(i % 5);
     l.group = 7;
     l.cos_outer = 0.5f, l.blend = 0.1f, l.spot_cosine = 1, l.spread_tan = 2;
   }
@@ -78,6 +78,7 @@ TEST(VplFile, WrongFilesAreNamedWithRecordAndField) {
   expect_in(light([](auto& l) { l.intensity[0] = INFINITY; }), {"light 1", "intensity", "inf"});
   expect_in(light([](auto& l) { l.normal[1] = 0; }), {"light 1", "normal", "(0, 0, 0)"});
   expect_in(light([](auto& l) { l.kind = 9; }), {"light 1", "kind is 9"});
+  expect_in(light([](auto& l) { l.kind = LUMICUT_VPL_SPHERE, l.cos_outer = 0; }), {"light 1", "radius is 0"});
   expect_in(light([](auto& l) { l.spread_tan = NAN; }), {"light 1", "spot"});
 }
 

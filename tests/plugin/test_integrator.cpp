@@ -75,7 +75,7 @@ TEST(Integrators, HostLightsAreCheckedByNameAndValue) {
     spoil(lights[2]);
     EXPECT_CODE(lumicut_integrator_set_lights(i.get(), lights.data(), lights.size()), code, text);
   };
-  refused([](auto& l) { l.kind = 4; }, LUMICUT_INVALID_ARGUMENT, "lumicut_vpl[2].kind: 4 is not in [0, 3]");
+  refused([](auto& l) { l.kind = 5; }, LUMICUT_INVALID_ARGUMENT, "lumicut_vpl[2].kind: 5 is not in [0, 4]");
   refused([](auto& l) { l.position[1] = NAN; }, LUMICUT_INVALID_ARGUMENT, "lumicut_vpl[2].position[1]: nan");
   refused([](auto& l) { l.normal[2] = 0; }, LUMICUT_INVALID_ARGUMENT, "lumicut_vpl[2].normal: has length 0, not 1");
   refused([](auto& l) { l.intensity[2] = -1; }, LUMICUT_INVALID_ARGUMENT, "lumicut_vpl[2].intensity[2]: -1");
@@ -84,6 +84,52 @@ TEST(Integrators, HostLightsAreCheckedByNameAndValue) {
           "lumicut_vpl[2].cos_outer: 2");
   refused([](auto& l) { l.profile = 1; }, LUMICUT_INVALID_ARGUMENT, "lumicut_vpl[2].profile");
   EXPECT_CODE(lumicut_integrator_set_lights(i.get(), nullptr, 2), LUMICUT_INVALID_ARGUMENT, "count is 2");
+}
+
+TEST(Integrators, SpheresGoOutAndComeInAgainWithTheirRadii) {
+  const api::Device device(2);
+  const api::Scene s = scene(device);
+  api::Integrator first = integrator(device), points = integrator(device);
+  first.set("virtual_lights", "spheres");
+  const auto image = render(first, s);
+  EXPECT_NE(image, render(points, s));
+  const auto lights = first.lights();
+  uint64_t spheres = 0, others = 0;
+  for (const lumicut_vpl& l : lights) (l.kind == LUMICUT_VPL_SPHERE ? spheres : others) += 1;
+  EXPECT_GT(spheres, 100u);
+  EXPECT_GT(others, 50u) << "lamps are what they were";
+  for (const char* setting : {"spheres", "points"}) {  // the host's own lights are what they are
+    api::Integrator second = integrator(device, 7);
+    second.set_lights(lights);
+    second.set("virtual_lights", setting);
+    EXPECT_EQ(render(second, s), image);
+  }
+  first.set("sphere_scale", "2");
+  render(first, s);
+  const auto wider = first.lights();
+  ASSERT_EQ(wider.size(), lights.size());
+  for (size_t i = 0; i < lights.size(); ++i)
+    if (lights[i].kind == LUMICUT_VPL_SPHERE) EXPECT_FLOAT_EQ(wider[i].cos_outer, 2 * lights[i].cos_outer);
+}
+
+TEST(Integrators, PointsOfAHostAreNotTakenForSpheres) {
+  const api::Device device(1);
+  const api::Scene s = scene(device);
+  api::Integrator i = integrator(device);
+  lumicut_vpl light{};
+  light.kind = LUMICUT_VPL_ORIENTED, light.normal[2] = 1, light.intensity[0] = 1;
+  i.set_lights({light});
+  i.set("virtual_lights", "spheres");
+  EXPECT_CODE(lumicut_integrator_prepare(i.get(), s.get()), LUMICUT_INVALID_ARGUMENT, "parameter virtual_lights");
+  light.kind = LUMICUT_VPL_SPHERE;
+  for (const float radius : {0.0f, -1.0f, NAN, INFINITY}) {
+    light.cos_outer = radius;
+    EXPECT_CODE(lumicut_integrator_set_lights(i.get(), &light, 1), LUMICUT_INVALID_ARGUMENT,
+                "lumicut_vpl[0].cos_outer");
+  }
+  light.cos_outer = 0.2f;
+  i.set_lights({light});
+  i.prepare(s);
 }
 
 TEST(Integrators, AMillionHostLightsAreTaken) {

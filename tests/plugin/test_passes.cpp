@@ -139,6 +139,23 @@ TEST(Passes, SecondsStopARenderThatHasNoOtherEnd) {
   EXPECT_EQ(status.passes_total, 0u);
 }
 
+TEST(Passes, SpheresShrinkFromPassToPass) {
+  const api::Device device(2);
+  const api::Scene s = scene(device);
+  api::Integrator i = integrator(device, 300);
+  i.set("virtual_lights", "spheres");
+  const auto mean_radius = [&](uint32_t n) {
+    const api::Render r(i, s, passes_of(n, 16, 12));
+    r.wait();
+    double sum = 0, count = 0;
+    for (const lumicut_vpl& l : i.lights())  // of the last pass
+      if (l.kind == LUMICUT_VPL_SPHERE) sum += static_cast<double>(l.cos_outer), count += 1;
+    return sum / count;
+  };
+  // The fourth root of 16; other lights lie a little otherwise.
+  EXPECT_NEAR(mean_radius(16) / mean_radius(1), 0.5, 0.05);
+}
+
 TEST(Passes, OnlyTracedLightsAreCompensated) {
   const api::Device device(1);
   const api::Scene s = scene(device);

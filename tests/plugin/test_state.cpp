@@ -57,6 +57,19 @@ TEST(State, LoadedStateRendersTheSameImageWithoutAnyPreparation) {
   EXPECT_EQ(second.lights().size(), first.lights().size());
 }
 
+TEST(State, OfSpheresRendersTheSameImage) {
+  const api::Device device(2);
+  const api::Scene s = scene(device);
+  api::Integrator first = integrator(device, 1000, "wspd"), second = integrator(device, 1000, "wspd"),
+                  points = integrator(device, 1000, "wspd");
+  first.set("virtual_lights", "spheres"), second.set("virtual_lights", "spheres");
+  const auto image = render(first, s);
+  const auto bytes = save(first);
+  ASSERT_EQ(load(second, s, bytes), LUMICUT_OK) << lumicut_last_error();
+  EXPECT_EQ(render(second, s), image);
+  EXPECT_CODE(load(points, s, bytes), LUMICUT_INVALID_ARGUMENT, "virtual_lights=spheres");
+}
+
 TEST(State, AnotherCameraUsesWhatWasPrepared) {
   const api::Device device(2);
   api::Scene s = scene(device);

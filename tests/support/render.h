@@ -16,14 +16,14 @@ struct Frame {
 
 using Settings = std::vector<std::pair<std::string, std::string>>;
 
-inline VplSet lights_of(const Scene& scene, uint32_t count, uint64_t seed = 1) {
+inline VplSet lights_of(const Scene& scene, uint32_t count, uint64_t seed = 1, float sphere_scale = 0.0f) {
   Progress progress;
-  return off_surfaces(trace_vpls(scene, {.count = count, .seed = seed}, progress), scene);
+  return off_surfaces(trace_vpls(scene, {.count = count, .seed = seed, .sphere_scale = sphere_scale}, progress), scene);
 }
 
 inline Frame render(const Scene& scene, const std::string& id, const VplSet& vpls, const Settings& settings,
                     uint32_t width = 64, uint32_t height = 48, uint32_t samples = 1, int threads = 0,
-                    float compensate = 0.0f, uint64_t seed = 1) {
+                    float compensate = 0.0f, uint64_t seed = 1, bool spheres = false) {
   const IntegratorEntry* entry = find_integrator(id);
   if (entry == nullptr) fail_argument("no integrator " + id);
   Params params(all_params(*entry));
@@ -33,7 +33,7 @@ inline Frame render(const Scene& scene, const std::string& id, const VplSet& vpl
   FrameOptions options;
   options.width = width, options.height = height, options.samples = samples, options.tile_size = 32;
   options.crop = {0, 0, width, height};
-  options.compensate = compensate, options.seed = seed;
+  options.compensate = compensate, options.seed = seed, options.spheres = spheres;
   Film film(options.crop);
   Arena arena(threads);
   arena.run([&] {

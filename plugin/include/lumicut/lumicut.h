@@ -32,7 +32,7 @@ extern "C" {
 #endif
 
 #define LUMICUT_ABI_MAJOR 1
-#define LUMICUT_ABI_MINOR 1
+#define LUMICUT_ABI_MINOR 2
 #define LUMICUT_FOREVER 0xffffffffu /* milliseconds */
 
 typedef int32_t lumicut_result;
@@ -301,19 +301,20 @@ LUMICUT_API lumicut_result lumicut_integrator_set(lumicut_integrator integrator,
 LUMICUT_API const char* lumicut_integrator_get(lumicut_integrator integrator, const char* name); /* [object] NULL: no such parameter */
 
 typedef struct lumicut_vpl {
-  float position[3];  /* oriented: on its surface; directional: unused */
+  float position[3];  /* oriented, sphere: on its surface; directional: unused */
   uint32_t kind;      /* LUMICUT_VPL_OMNI ... */
-  float normal[3];    /* unit; oriented: I falls with max(0, cos); directional: the way light travels; spot: axis */
+  float normal[3];    /* unit; oriented, sphere: I falls with max(0, cos); directional: the way light travels; spot: axis */
   uint32_t group;     /* light group it came from */
   float intensity[3]; /* W/sr along the normal; directional: irradiance, W/m2 */
-  float cos_outer;    /* spot: falls to 0 at this cosine */
+  float cos_outer;    /* spot: falls to 0 at this cosine; sphere: its radius, above 0 */
   float blend;        /* spot: smoothstep over this much of cosine */
   float spot_cosine;  /* spot: 1: times the cosine too */
   float spread_tan;   /* spot: narrowed area lamps fall off with max(0, 1 - spread_tan tan(theta)); 0: no */
   uint32_t profile;   /* spot: name of a profile that a scene of this process was given, in place of this falloff; then blend,
                          spot_cosine and spread_tan are its tangent, and intensity is that of its largest value; 0: none */
 } lumicut_vpl;
-enum { LUMICUT_VPL_OMNI = 0, LUMICUT_VPL_ORIENTED = 1, LUMICUT_VPL_DIRECTIONAL = 2, LUMICUT_VPL_SPOT = 3 };
+enum { LUMICUT_VPL_OMNI = 0, LUMICUT_VPL_ORIENTED = 1, LUMICUT_VPL_DIRECTIONAL = 2, LUMICUT_VPL_SPOT = 3,
+       LUMICUT_VPL_SPHERE = 4 /* an oriented light spread over a ball */ };
 
 /* The host's own VPLs, instead of those traced from the scene; count 0: trace again. */
 LUMICUT_API lumicut_result lumicut_integrator_set_lights(lumicut_integrator integrator, const lumicut_vpl* lights, uint64_t count); /* [object] */
