@@ -190,9 +190,10 @@ class MeshCache:
 
 
 class Collector:
-    def __init__(self, depsgraph, report=None, check=lambda: None, cache=None, images=None, max_shininess=1000.0):
-        """`check` is called between meshes and instances and raises to stop."""
-        self.depsgraph, self.check, self.cache = depsgraph, check, cache
+    def __init__(self, depsgraph, report=None, check=lambda: None, cache=None, images=None, max_shininess=1000.0, bake=None):
+        """`check` is called between meshes and instances and raises to stop. `bake`: sky.bake or the like, for worlds
+        that cannot be read."""
+        self.depsgraph, self.check, self.cache, self.bake = depsgraph, check, cache, bake
         self.report = report if report is not None else Report()
         self.materials = Materials(self.report, max_shininess, images, check)
         self.scene = SceneData()
@@ -228,7 +229,11 @@ class Collector:
         self.check()
         self.scene.meshes = [mesh for mesh in self._meshes.values() if mesh is not None and mesh.transforms]
         scene = self.depsgraph.scene_eval
-        self.scene.environment = lights.convert_world(scene.world, self.materials, self.report)
+        bake = (lambda world: self.bake(world, scene.frame_current, self.check)) if self.bake is not None else None
+        self.scene.environment, suns = lights.convert_world(scene.world, self.materials, self.report, bake)
+        for name, sun in suns:
+            sun.group = self._group(scene.world)
+            self.scene.lights.append((name, sun))
         if self.scene.environment is not None:
             self.scene.environment.group = self._group(scene.world)
         if self.scene.environment is not None and scene.render.film_transparent:

@@ -8,7 +8,7 @@ import traceback
 import bpy
 import numpy as np
 
-from . import collect, export, library, properties, runtime, viewport
+from . import collect, export, library, properties, runtime, sky, viewport
 from .report import Report
 
 POLL_MS = 40
@@ -124,7 +124,8 @@ class LumicutEngine(bpy.types.RenderEngine):
         started = time.perf_counter()
         self.say("collecting the scene")
         report = Report()
-        data = collect.Collector(depsgraph, report, self._check, max_shininess=settings.max_shininess).collect()
+        data = collect.Collector(depsgraph, report, self._check, max_shininess=settings.max_shininess,
+                                 bake=None if self.is_preview else sky.bake).collect()
         camera = self.camera_override or scene.camera
         if camera is None:
             raise library.Error(library.INVALID_STATE, "the scene has no camera")

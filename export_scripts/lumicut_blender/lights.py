@@ -6,8 +6,9 @@ import bpy
 import numpy as np
 from mathutils import Euler
 
-from . import ies, library
+from . import ies, library, sky
 from .nodes import Evaluator, Mapping, Picture, Value
+from .report import Report
 from .scene_data import Profile
 
 TYPES = {"POINT": library.POINT, "SPOT": library.SPOT, "SUN": library.SUN}
@@ -252,35 +253,70 @@ def convert_light(name, light, matrix, images, report, profiles):
     return out
 
 
-def convert_world(world, materials, report):
-    """A library.Environment, or None for black."""
+BY_RAY = "Worlds that differ by ray, taken as for lighting"
+WORLD_VOLUME = "World volumes left out"
+
+
+def convert_world(world, materials, report, bake=None):
+    """(library.Environment, or None for black; [(name, library.Light)] of suns that were in it).
+
+    `bake(world)` renders what cannot be read, see sky.py: it gives None where that is not to be had now."""
     if world is None:
-        return None
+        return None, []
+    own = Report()
+    colour, rotation = _read_world(world, materials, own)
+    baked, suns = None, []
+    if bake is not None and any(text not in {BY_RAY, WORLD_VOLUME} for text in own.texts()):
+        try:
+            baked = bake(world)
+        except sky.BakeError as reason:
+            report.note(f"{world.name} ({reason})", "Worlds that Cycles could not render into an image")
+    if baked is None:
+        report.take(own)
+    else:
+        height, width = baked.pixels.shape[:2]
+        report.note(world.name, f"Worlds rendered by Cycles into an image of {width} x {height}")
+        report.take(own, {BY_RAY, WORLD_VOLUME})
+        picture = Picture(f"{world.name} sky", (world.name_full, "baked", id(baked)), Mapping(), 0, linear=baked.pixels)
+        colour, rotation = Value(1, picture if baked.pixels.any() else None), np.eye(3)
+        if colour.picture is None:
+            colour = Value(0)
+        for towards, irradiance, angle in baked.suns:
+            most = float(irradiance.max())
+            sun = library.Light(type=library.SUN, unit=library.WATT, value=most, radius=angle / 2)
+            sun.color[:] = [float(c) / most for c in irradiance]
+            sun.direction[:] = [-float(c) for c in towards]
+            suns.append((f"{world.name} sun", sun))
     environment = library.Environment()
+    environment.color[:] = [max(0.0, float(c)) for c in colour.factor]
+    if not any(environment.color):
+        return None, suns
+    if colour.picture is not None:
+        environment.texture = materials.picture_number(colour.picture)
+        environment.world_to_map[:] = [float(v) for v in rotation.reshape(9)]
+    return environment, suns
+
+
+def _read_world(world, materials, report):
+    """(radiance, rotation of its image) as the nodes say, where they can be followed."""
     if not world.use_nodes or world.node_tree is None:
-        environment.color[:] = [max(0.0, float(c)) for c in world.color]
-        return environment if any(environment.color) else None
-    evaluator = Evaluator(world.name, materials.images, report)
+        return Value([max(0.0, float(c)) for c in world.color]), np.eye(3)
+    reader = WorldReader(world.name, materials.images, report)
     output = world.node_tree.get_output_node("CYCLES") or world.node_tree.get_output_node("ALL")
     node, stack = None, ()
     if output is not None:
         if output.inputs["Volume"].is_linked:
-            evaluator.note("world volume", "Volumes left out")
-        node, _, stack = evaluator.source(output.inputs["Surface"], ())
+            reader.note("", WORLD_VOLUME)
+        node, _, stack = reader.source(output.inputs["Surface"], ())
     if node is None:
-        return None
+        return Value(0), np.eye(3)
     if node.type != "BACKGROUND":
-        evaluator.note(node.bl_label, "Shaders of worlds other than Background left out")
-        return None
-    reader = WorldReader(world.name, materials.images, report)
+        reader.note(node.bl_label, "Shaders of worlds other than Background left out")
+        return Value(0), np.eye(3)
     colour = reader.multiply(reader.value(node.inputs["Color"], stack), reader.value(node.inputs["Strength"], stack))
-    environment.color[:] = [max(0.0, float(c)) for c in colour.factor]
-    if not any(environment.color):
-        return None
-    if colour.picture is not None:
-        environment.texture = materials.picture_number(colour.picture)
-        environment.world_to_map[:] = [float(v) for v in reader.rotation.reshape(9)]
-    return environment
+    if colour.picture is None:
+        return colour, np.eye(3)
+    return colour, reader.rotation if reader.rotation is not None else np.eye(3)
 
 
 class WorldReader(Directions):
@@ -290,7 +326,7 @@ class WorldReader(Directions):
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
-        self.rotation = np.eye(3)
+        self.rotation = None  # not met yet
 
     def _tex_environment(self, node, output, stack):
         if node.image is None:
@@ -304,6 +340,8 @@ class WorldReader(Directions):
         rotation = self.direction(node.inputs["Vector"], stack)
         if rotation is None:
             self.note(node.image.name, "Skies on unknown coordinates, taken as unturned")
+        elif self.rotation is not None and not np.allclose(rotation, self.rotation):
+            self.note(node.image.name, "Skies of several rotations, all turned as the first")
         else:
             self.rotation = rotation
 
@@ -318,5 +356,5 @@ class WorldReader(Directions):
         return Value((0.3, 0.45, 0.7))
 
     def _light_path(self, node, output, stack):
-        self.note("Light Path", "Worlds that differ by ray, taken as for lighting")
+        self.note("Light Path", BY_RAY)
         return Value(0.0)

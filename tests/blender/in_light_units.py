@@ -203,6 +203,71 @@ class LightUnits(unittest.TestCase):
                 # All pixels share one random set of directions: 160,000 leave 0.4 % of noise in the mean.
                 self.agree(lights=160000)
 
+    def world_nodes(self, *kinds):
+        tree = bpy.context.scene.world.node_tree
+        return (tree.links, next(n for n in tree.nodes if n.type == "BACKGROUND"), *(tree.nodes.new(kind) for kind in kinds))
+
+    def test_skies_of_all_models_are_cycles_own_with_the_sun_as_a_lamp(self):
+        links, background, node = self.world_nodes("ShaderNodeTexSky")
+        links.new(node.outputs[0], background.inputs["Color"])
+        plane = bpy.data.objects["Plane"]
+        kinds = [item.identifier for item in node.bl_rna.properties["sky_type"].enum_items]
+        self.assertGreaterEqual(len(kinds), 3)
+        for kind in kinds:
+            # A board throws the sun's shadow: nothing of the sun may be left in the image, which knows no edge that fine.
+            board = h.add_plane(0.8, 1.0, h.diffuse(), "Board")
+            node.sky_type = kind
+            node.sun_elevation, node.sun_rotation, node.sun_size = 0.6, 0.9, 0.05
+            node.sun_direction = (0.5, 0.3, 0.6)
+            node.sun_intensity, background.inputs["Strength"].default_value = 0.8, 0.1
+            plane.rotation_euler = (0.2, 0, 0)
+            with self.subTest(kind=kind):
+                self.agree(samples=256, block=0.08, lights=40000)
+                self.assertRegex("\n".join(h.last_notes()), "Worlds rendered by Cycles into an image of 1024 x 512: World")
+                self.assertEqual(h.last_stats()["scene"]["lamps"], 1 if "NISHITA" in kind or "SCATTERING" in kind else 0)
+            bpy.data.objects.remove(board)
+
+    def test_worlds_of_any_nodes_come_as_cycles_has_them_and_are_rendered_once(self):
+        from lumicut_blender import sky
+        links, background, mix, other, noise, ramp, ray = self.world_nodes(
+            "ShaderNodeMixShader", "ShaderNodeBackground", "ShaderNodeTexNoise", "ShaderNodeValToRGB", "ShaderNodeLightPath")
+        noise.inputs["Scale"].default_value = 2
+        ramp.color_ramp.elements[1].color = (1, 0.6, 0.2, 1)
+        links.new(noise.outputs["Fac"], ramp.inputs[0])
+        links.new(ramp.outputs["Color"], background.inputs["Color"])
+        other.inputs["Color"].default_value = (0, 0, 9, 1)
+        links.new(ray.outputs["Is Camera Ray"], mix.inputs[0])  # what the camera alone sees lights nothing
+        links.new(background.outputs[0], mix.inputs[1])
+        links.new(other.outputs[0], mix.inputs[2])
+        output = next(n for n in bpy.context.scene.world.node_tree.nodes if n.type == "OUTPUT_WORLD")
+        links.new(mix.outputs[0], output.inputs["Surface"])
+        begun = []
+        saved, sky.Process = sky.Process, lambda *words: (begun.append(words), saved(*words))[1]
+        try:
+            self.agree(block=0.05)
+            self.agree(samples=64, block=0.1)
+            self.assertEqual(len(begun), 1)
+            ramp.color_ramp.elements[1].color = (0.2, 0.6, 1, 1)
+            self.agree(block=0.05)
+            self.assertEqual(len(begun), 2)
+        finally:
+            sky.Process = saved
+
+    def test_a_world_that_cycles_cannot_render_is_listed_with_the_reason(self):
+        from lumicut_blender import sky
+        links, background, noise = self.world_nodes("ShaderNodeTexNoise")
+        links.new(noise.outputs["Color"], background.inputs["Color"])
+        saved, sky.WIDTH = sky.WIDTH, 0
+        try:
+            with h.quiet():
+                h.set_lumicut("exhaustive", vpls=100)
+                h.render()
+        finally:
+            sky.WIDTH = saved
+        notes = "\n".join(h.last_notes())
+        self.assertRegex(notes, r"could not render into an image: World \(.*Error")
+        self.assertIn("Nodes taken as a constant colour", notes)
+
     def test_a_lamp_among_others_keeps_its_share(self):
         h.add_light("POINT", (1, 1, 2), 60, shadow_soft_size=0)
         h.add_light("AREA", (-1, 0, 2), 80, shape="DISK", size=0.5)
