@@ -101,9 +101,10 @@ class LumicutEngine(bpy.types.RenderEngine):
         return self.test_break()
 
     def say(self, phase, fraction=None):
-        """The phase's name, and how far it is. Called at every poll; shown when the phase is new, or after a while."""
+        """The phase's name, and how far it is. Called at every poll; shown after a while, and at once where the phase is
+        new and does not say how far it is. Passes go through their phases many times a second."""
         now, shown = time.perf_counter(), getattr(self, "_shown", None)
-        if shown is not None and shown[0] == phase and (fraction is None or now < shown[1] + SHOW_SECONDS):
+        if shown is not None and (now < shown[1] + SHOW_SECONDS if fraction is not None else shown[0] == phase):
             return
         self._shown = phase, now
         if fraction is None:
