@@ -75,8 +75,7 @@ def sun_of(scene, node, folder):
 
 def main():
     path, name, frame, width, result = sys.argv[sys.argv.index("--") + 1:]
-    import addon_utils
-    if addon_utils.enable("cycles") is None:
+    if not hasattr(bpy.types.Scene, "cycles"):  # on from the start, where there is one
         raise RuntimeError("this Blender has no Cycles")
     scene = bpy.context.scene
     for ob in list(scene.objects):
