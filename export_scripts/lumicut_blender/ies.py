@@ -111,16 +111,22 @@ def _cubic(a, b, c, d, t):
     return 0.5 * (((d + 3 * (b - c) - a) * t + (2 * a - 5 * b + 4 * c - d)) * t + (c - a)) * t + b
 
 
-def resampled(vertical, horizontal, candela):
-    """The same in radians, fine enough for straight lines between its angles to follow Cycles' cubic ones."""
+def resampled(vertical, horizontal, candela, wraps=True):
+    """The same in radians, fine enough for straight lines between its angles to follow Cycles' cubic ones.
+
+    `wraps`: what Cycles' cubic takes beyond the ends, see lights.IES_WITHOUT_WRAP."""
     v, i, t = _finer(np.radians(vertical), COARSE["vertical"])
     # Below the first angle Cycles takes the second, beyond the last the last.
     last = len(vertical) - 1
     column = [candela[:, k] for k in (np.where(i == 0, 1, i - 1), i, i + 1, np.minimum(i + 2, last))]
+    if not wraps:
+        column[3] = np.where(i + 2 > last, 0, column[3])
     values = _cubic(*column, t)
-    if len(horizontal) == 2:  # the same all around
+    if wraps and len(horizontal) == 2:  # the same all around
         return v, np.zeros(1), np.maximum(0, values[:1])
     h, j, t = _finer(np.radians(horizontal), COARSE["horizontal"])
     count = len(horizontal)
     row = [values[k] for k in (np.where(j == 0, count - 2, j - 1), j, j + 1, np.where(j + 2 == count, 1, j + 2))]
+    if not wraps:
+        row[0], row[3] = np.where((j == 0)[:, None], 0, row[0]), np.where((j + 2 == count)[:, None], 0, row[3])
     return v, h, np.maximum(0, _cubic(*row, t[:, None]))

@@ -20,6 +20,9 @@ AREA_TYPES = {"SQUARE": library.RECTANGLE, "RECTANGLE": library.RECTANGLE, "DISK
 AREA_IS_LAMBERTIAN = (4, 3, 0)
 # Measured against each version's Cycles: 3.x multiplies by the cosine to the axis, 4.x no longer does.
 SPOT_WITHOUT_COSINE = (4, 0, 0)
+# Measured: 3.4.1 interpolates IES files around the full circle, 4.3.2 takes 0 beyond 0 and 360 degrees, which makes them
+# up to 1/16 brighter in their first and last interval, and files that are the same all around 1/8.
+IES_WITHOUT_WRAP = (4, 3, 0)
 
 
 class Directions(Evaluator):
@@ -120,7 +123,8 @@ class Profiles:
                 else:
                     with open(source, encoding="latin-1") as file:
                         text = file.read()
-                table = (source if internal else bpy.path.basename(source), *ies.resampled(*ies.parse(text)))
+                table = (source if internal else bpy.path.basename(source),
+                         *ies.resampled(*ies.parse(text), wraps=bpy.app.version < IES_WITHOUT_WRAP))
             except (ies.IesError, OSError) as reason:
                 words = reason.strerror if isinstance(reason, OSError) else str(reason)
                 table = f"{source or node.name} ({words})"

