@@ -190,14 +190,19 @@ class MeshCache:
 
 
 class Collector:
-    def __init__(self, depsgraph, report=None, check=lambda: None, cache=None, images=None, max_shininess=1000.0):
-        """`check` is called between meshes and instances and raises to stop."""
-        self.depsgraph, self.check, self.cache = depsgraph, check, cache
+    def __init__(self, depsgraph, report=None, check=lambda: None, cache=None, images=None, max_shininess=1000.0, bake=None):
+        """`check` is called between meshes and instances and raises to stop. `bake`: sky.bake or the like, for worlds
+        that cannot be read."""
+        self.depsgraph, self.check, self.cache, self.bake = depsgraph, check, cache, bake
         self.report = report if report is not None else Report()
         self.materials = Materials(self.report, max_shininess, images, check)
         self.scene = SceneData()
+        self.profiles = lights.Profiles(self.report)
         self._meshes = {}
         self.instances = 0
+        # Light groups by name: 0 holds all that is in none.
+        names = getattr(depsgraph.view_layer_eval, "lightgroups", ())
+        self.groups = {group.name: 1 + i for i, group in enumerate(names)}
 
     def collect(self):
         override = self.depsgraph.view_layer_eval.material_override
@@ -212,8 +217,10 @@ class Collector:
                 self._check_particles(instance)
                 self._add_mesh(instance, ob, override)
             elif ob.type == "LIGHT":
-                light = lights.convert_light(ob.name, ob.data, instance.matrix_world, self.materials.images, self.report)
+                light = lights.convert_light(ob.name, ob.data, instance.matrix_world, self.materials.images, self.report,
+                                             self.profiles)
                 if light is not None:
+                    light.group = self._group(ob)
                     self.scene.lights.append((ob.name, light))
                 if ob.visible_camera:
                     self.report.note(ob.name, "Lamps that the camera should see, which it does not")
@@ -222,7 +229,13 @@ class Collector:
         self.check()
         self.scene.meshes = [mesh for mesh in self._meshes.values() if mesh is not None and mesh.transforms]
         scene = self.depsgraph.scene_eval
-        self.scene.environment = lights.convert_world(scene.world, self.materials, self.report)
+        bake = (lambda world: self.bake(world, scene.frame_current, self.check)) if self.bake is not None else None
+        self.scene.environment, suns = lights.convert_world(scene.world, self.materials, self.report, bake)
+        for name, sun in suns:
+            sun.group = self._group(scene.world)
+            self.scene.lights.append((name, sun))
+        if self.scene.environment is not None:
+            self.scene.environment.group = self._group(scene.world)
         if self.scene.environment is not None and scene.render.film_transparent:
             self.scene.environment.flags |= library.ENVIRONMENT_HIDDEN
         if scene.render.use_motion_blur:
@@ -232,7 +245,12 @@ class Collector:
         # Materials at last: the world's image has been numbered by now.
         self.scene.materials = self.materials.items() or [("default", library.Material())]
         self.scene.images = self.materials.image_items()
+        self.scene.profiles = self.profiles.items
+        self.scene.groups = list(self.groups)
         return self.scene
+
+    def _group(self, owner):
+        return self.groups.get(getattr(owner, "lightgroup", ""), 0)
 
     def _check_particles(self, instance):
         if instance.is_instance:
@@ -252,10 +270,13 @@ class Collector:
         else:
             slots = [slot.material for slot in ob.material_slots] or [None]
         numbers = [self.materials.number(material) for material in slots]
-        key = (mesh.as_pointer(), tuple(numbers))
+        group = self._group(ob) if any(any(self.materials.converted[n].values.emission) for n in numbers) else 0
+        key = (mesh.as_pointer(), tuple(numbers), group)
         if key not in self._meshes:
             self.check()
-            self._meshes[key] = self._read(ob, mesh, slots, numbers)
+            self._meshes[key] = found = self._read(ob, mesh, slots, numbers)
+            if found is not None:
+                found.group = group
             for flag, text in (("is_holdout", "Holdouts taken as ordinary objects"),
                                ("is_shadow_catcher", "Shadow catchers taken as ordinary objects")):
                 if getattr(ob, flag, False):

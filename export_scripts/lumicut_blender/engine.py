@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The render engine: final frames. The viewport's half is in viewport.py."""
+import math
 import threading
 import time
 import traceback
@@ -7,13 +8,14 @@ import traceback
 import bpy
 import numpy as np
 
-from . import collect, export, library, properties, runtime, viewport
+from . import collect, export, library, properties, runtime, sky, viewport
 from .report import Report
 
 POLL_MS = 40
 SHOW_SECONDS = 0.25  # between two changes of what is shown: each redraws the window, and a window that draws hears no key
 FLAT_RECTS = bpy.app.version >= (4, 1, 0)
 NO_DEPTH = 1e10  # as Cycles has it where nothing is hit
+WITHOUT_GROUPS = {"path_tracer"}  # the library tells groups apart by their virtual lights
 export_requests = []  # folders that the next render writes a scene to, in place of rendering
 
 
@@ -99,9 +101,10 @@ class LumicutEngine(bpy.types.RenderEngine):
         return self.test_break()
 
     def say(self, phase, fraction=None):
-        """The phase's name, and how far it is. Called at every poll; shown when the phase is new, or after a while."""
+        """The phase's name, and how far it is. Called at every poll; shown after a while, and at once where the phase is
+        new and does not say how far it is. Passes go through their phases many times a second."""
         now, shown = time.perf_counter(), getattr(self, "_shown", None)
-        if shown is not None and shown[0] == phase and (fraction is None or now < shown[1] + SHOW_SECONDS):
+        if shown is not None and (now < shown[1] + SHOW_SECONDS if fraction is not None else shown[0] == phase):
             return
         self._shown = phase, now
         if fraction is None:
@@ -122,7 +125,8 @@ class LumicutEngine(bpy.types.RenderEngine):
         started = time.perf_counter()
         self.say("collecting the scene")
         report = Report()
-        data = collect.Collector(depsgraph, report, self._check, max_shininess=settings.max_shininess).collect()
+        data = collect.Collector(depsgraph, report, self._check, max_shininess=settings.max_shininess,
+                                 bake=None if self.is_preview else sky.bake).collect()
         camera = self.camera_override or scene.camera
         if camera is None:
             raise library.Error(library.INVALID_STATE, "the scene has no camera")
@@ -130,6 +134,7 @@ class LumicutEngine(bpy.types.RenderEngine):
         collected = time.perf_counter() - started
         width, height = self.resolution_x, self.resolution_y
         crop = crop_of(scene.render, width, height)
+        self._options = self._render_options(depsgraph, settings, data.groups, report)
         self._tell(report)
         if export_requests and not self.is_preview:
             export.write_scene(export_requests[0], data, width, height, settings)
@@ -146,15 +151,15 @@ class LumicutEngine(bpy.types.RenderEngine):
         with library.Scene(device, settings.accel) as target, library.Integrator(device, integrator_name) as integrator:
             data.upload(target, self._check)
             triangles, instances = data.triangles(), sum(len(m.transforms) for m in data.meshes)
-            lamps, meshes = len(data.lights), len(data.meshes)
+            lamps, meshes, groups = len(data.lights), len(data.meshes), data.groups
             data = None  # the library has its own copy now
             watched.run(target, "acceleration structure", target.commit)
             self._check()
             for name, value in parameters.items():
                 integrator.set(name, value)
             with library.Render(integrator, target, width, height, samples, crop, self._tile_size(crop),
-                                1 if self.is_preview else settings.passes) as render:
-                self._follow(render, depsgraph, crop, height)
+                                **self._options) as render:
+                self._follow(render, depsgraph, crop, height, groups)
                 stats = render.stats()
         if not self.is_preview:
             runtime.last.update(stats=stats, collect_seconds=collected, seconds=time.perf_counter() - started,
@@ -167,6 +172,20 @@ class LumicutEngine(bpy.types.RenderEngine):
         if "stochastic_lightcuts" in names:
             return "stochastic_lightcuts", 1, {"vpls": "2000", "lights": "32"}
         return names[0], 1, {"vpls": "300"}
+
+    def _render_options(self, depsgraph, settings, groups, report):
+        """What lumicut_render_desc has beside size, samples and tiles."""
+        if self.is_preview:
+            return {}
+        if groups and settings.integrator in WITHOUT_GROUPS:
+            report.note(settings.integrator, "Light groups left out by integrators without virtual lights")
+            groups = []
+        options = {name: getattr(settings, name) for name in properties.STOPS}
+        layer = depsgraph.view_layer_eval
+        options["flags"] = (library.ILLUMINANCE if layer.lumicut.use_pass_illuminance else 0) | (library.GROUPS if groups else 0)
+        if layer.lumicut.use_pass_error and settings.passes == 1:
+            report.note(layer.name, "Error passes that are 0, as a single pass cannot tell")
+        return options
 
     @staticmethod
     def _tile_size(crop):
@@ -181,9 +200,9 @@ class LumicutEngine(bpy.types.RenderEngine):
         for line in report.lines(most_names=12):
             self.report({"INFO"}, f"Lumicut: {line}")  # printed, where there is no window
 
-    def _follow(self, render, depsgraph, crop, height):
+    def _follow(self, render, depsgraph, crop, height, groups):
         """Polls until the frame is done; hands tiles over as they finish."""
-        passes = self._pass_list(depsgraph)
+        passes = self._pass_list(depsgraph, groups, render.groups())
         show_tiles = not bpy.app.background
         stopped, tiles_shown = False, 0.0
         while True:
@@ -196,9 +215,8 @@ class LumicutEngine(bpy.types.RenderEngine):
                 render.cancel()
                 continue
             phase, fraction = (status.phase or b"").decode(), status.fraction
-            if status.passes_total > 1:
-                phase = f"pass {min(status.passes_done + 1, status.passes_total)}/{status.passes_total}, {phase}"
-                fraction = status.tiles_done / max(1, status.tiles_total)
+            if status.passes_total != 1:
+                phase, fraction = self._progress(status, phase)
             self.say(phase, fraction)
             if status.state != library.RUNNING:
                 break
@@ -212,8 +230,24 @@ class LumicutEngine(bpy.types.RenderEngine):
         self._write(render, depsgraph, passes, crop, crop, height)
         self.update_progress(1.0)
 
-    def _pass_list(self, depsgraph):
-        """[(pass name, channel)] beside Combined."""
+    def _progress(self, status, phase):
+        """Text and share of a render of several passes."""
+        total = status.passes_total
+        number = f"{min(status.passes_done + 1, total)}/{total}" if total else f"{status.passes_done + 1}"
+        error = f", error {100 * status.error:.2g} %" if math.isfinite(status.error) else ""
+        if total:
+            return f"pass {number}{error}, {phase}", status.tiles_done / max(1, status.tiles_total)
+        # Until stopped: by the clock, or by the error, which falls with the root of the passes.
+        stops, share = self._options, 0.0
+        if stops["max_seconds"] > 0:
+            share = status.seconds / stops["max_seconds"]
+        if stops["target_error"] > 0 and math.isfinite(status.error):
+            share = max(share, (stops["target_error"] / max(status.error, 1e-9)) ** 2)
+        return f"pass {number}{error}, {phase}", min(1.0, share)
+
+    def _pass_list(self, depsgraph, groups=(), lit=()):
+        """[(pass name, channel or None for black)] beside Combined. `groups`: names of light groups, from number 1;
+        `lit`: numbers of those that something emits into."""
         layer = depsgraph.view_layer_eval
         chosen = [(name, channel) for name, channel, wanted in
                   (("Depth", "depth", layer.use_pass_z), ("Normal", "normal", layer.use_pass_normal),
@@ -222,6 +256,9 @@ class LumicutEngine(bpy.types.RenderEngine):
             if getattr(layer.lumicut, prop):
                 self.add_pass(name, len(letters), letters, layer=layer.name)
                 chosen.append((name, channel))
+        for number, group in enumerate(groups, 1):
+            self.add_pass(properties.GROUP_PASS + group, 3, "RGB", layer=layer.name)
+            chosen.append((properties.GROUP_PASS + group, f"radiance.{number}" if number in lit else None))
         return chosen
 
     def _write(self, render, depsgraph, passes, crop, tile, height):
@@ -238,7 +275,7 @@ class LumicutEngine(bpy.types.RenderEngine):
             write_pass(found["Combined"], combined)
             for name, channel in passes:
                 target = found.get(name)
-                if target is None:
+                if target is None or channel is None:
                     continue
                 pixels = render.read(channel, tile)
                 if channel == "depth":
@@ -262,6 +299,8 @@ class LumicutEngine(bpy.types.RenderEngine):
         for name, prop, _, _, letters, kind in properties.PASSES.values():
             if getattr(renderlayer.lumicut, prop):
                 self.register_pass(scene, renderlayer, name, len(letters), letters, kind)
+        for group in getattr(renderlayer, "lightgroups", ()):
+            self.register_pass(scene, renderlayer, properties.GROUP_PASS + group.name, 3, "RGB", "COLOR")
 
     # ---- Viewport -----------------------------------------------------------------------------------------------
 

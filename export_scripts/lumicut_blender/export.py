@@ -91,6 +91,20 @@ def degrees(radians):
     return math.degrees(radians)
 
 
+CANDELA = 683.0  # of a W/sr, in scene files
+
+
+def rotation_of(light):
+    """Degrees that the scene file's horizontal angle 0 is turned by to lie at the lamp's tangent."""
+    axis, tangent = np.array(light.direction, np.float64), np.array(light.tangent, np.float64)
+    axis /= np.linalg.norm(axis)
+    zero = np.array([1.0, 0, 0]) - axis * axis[0]
+    if not np.linalg.norm(zero) > 1e-3:
+        zero = np.array([0, 1.0, 0]) - axis * axis[1]
+    zero /= np.linalg.norm(zero)
+    return degrees(math.atan2(tangent @ np.cross(zero, axis), tangent @ zero))
+
+
 def obj(mesh, mtl, material_names):
     """Text of an OBJ: as many vertices, normals and texture coordinates as the mesh has, in its order."""
     def lines(key, array):
@@ -168,14 +182,39 @@ class Writer:
                 out[slot + "_texture"] = self.texture(number, use)
         return out
 
-    @staticmethod
-    def light(light):
+    def profile(self, number):
+        """File of the 1-based table: W/sr there, candela here."""
+        key = "profile", number
+        if key not in self.files:
+            table = self.data.profiles[number - 1]
+            angles, rows = [degrees(v) for v in table.vertical], table.values.astype(np.float64) * CANDELA
+            if angles[-1] < 90 - 1e-4:  # the standard wants the table to end at 90 or 180 degrees
+                angles, rows = angles + [min(angles[-1] + 1e-3, 89.9999), 90.0], np.pad(rows, ((0, 0), (0, 2)))
+            elif angles[-1] not in (90.0, 180.0):
+                last = 90.0 if angles[-1] < 90.001 else 180.0
+                if angles[-1] < last - 1e-3:
+                    angles, rows = angles + [angles[-1] + 1e-3, last], np.pad(rows, ((0, 0), (0, 2)))
+                angles[-1] = last
+            around = [degrees(h) for h in table.horizontal]
+            around[-1] = 360.0 if len(around) > 1 else 0.0
+            text = ["IESNA:LM-63-1995", "[OTHER] Exported from Blender by the Lumicut add-on", "TILT=NONE",
+                    f"1 -1 1 {len(angles)} {len(around)} 1 2 0 0 0", "1 1 0"]
+            text += [" ".join(f"{v:.9g}" for v in row) for row in (angles, around, *rows)]
+            stem = os.path.splitext(os.path.basename(table.name))[0]
+            self.files[key] = self.write("profiles/" + plain_name(stem, self.used, ".ies"), "\n".join(text) + "\n")
+        return self.files[key]
+
+    def light(self, light):
         kind = ("point", "spot", "rectangle", "disk", "sun")[light.type]
         out = {"type": kind, "unit": "watt", "value": numbers([light.value])[0], "color": numbers(light.color)}
+        if light.group:
+            out["group"] = light.group
         if kind != "sun":
             out["position"] = numbers(light.position)
         if kind in ("point", "spot"):
             out["radius"] = numbers([light.radius])[0]
+        if light.profile:
+            out |= {"ies": self.profile(light.profile), "direction": numbers(light.direction), "rotation": rotation_of(light)}
         if kind in ("spot", "sun"):
             out["direction"] = numbers(light.direction)
         if kind == "spot":
@@ -202,6 +241,8 @@ class Writer:
             out |= {"image": self.image(e.texture, "radiance"), "world_to_map": numbers(e.world_to_map)}
         if e.flags & library.ENVIRONMENT_HIDDEN:
             out["hidden"] = True
+        if e.group:
+            out["group"] = e.group
         return out
 
     def scene(self, width, height, settings):
@@ -223,7 +264,8 @@ class Writer:
             file = "meshes/" + plain_name(mesh.name, self.used, ".obj")
             self.write(file, obj(mesh, mtl, names))
             out["meshes"].append({"name": mesh.name, "obj": file, "materials": {n: n for n in names},
-                                  "instances": [numbers(t) for t in mesh.transforms]})
+                                  "instances": [numbers(t) for t in mesh.transforms],
+                                  **({"group": mesh.group} if mesh.group else {})})
         if not out["meshes"]:
             raise ExportError("the scene has no mesh to export")
         return out
@@ -234,6 +276,11 @@ def command_of(path, settings):
     words = ["lumicut", "render", str(path), "-i", settings.integrator, "--accel", settings.accel]
     if settings.passes > 1:
         words += ["--passes", str(settings.passes)]
+    for name, option, default in (("max_seconds", "--seconds", 0), ("target_error", "--target-error", 0),
+                                  ("confidence", "--confidence", 0.95)):
+        value = properties.text_of(getattr(settings, name))
+        if float(value) != default:
+            words += [option, value]
     for name, value in properties.parameters_of(settings).items():
         words += ["-p", f"{name}={value}"]
     return words + ["-o", str(path.with_suffix(".exr"))]
@@ -261,6 +308,9 @@ def write_scene(path, data, width, height, settings):
             for key in [k for k in material if k.endswith("_texture")]:
                 t = material[key]
                 material[key] = moved(t) if isinstance(t, str) else {**t, "file": moved(t["file"])}
+        for light in scene["lights"]:
+            if "ies" in light:
+                light["ies"] = moved(light["ies"])
         if "image" in scene.get("environment", {}):
             scene["environment"]["image"] = moved(scene["environment"]["image"])
         scene["description"] += ". As F12 renders it: " + " ".join(command_of(pathlib.Path(path.name), settings)[:8])

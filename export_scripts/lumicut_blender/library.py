@@ -14,7 +14,7 @@ from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int32, c_u
 
 import numpy as np
 
-ABI_MAJOR, ABI_MINOR = 1, 0
+ABI_MAJOR, ABI_MINOR = 1, 1
 OK, INVALID_ARGUMENT, INVALID_STATE, UNSUPPORTED, OUT_OF_MEMORY, CANCELLED, INTERNAL = range(7)
 IDLE, RUNNING, DONE, STOPPED, FAILED = range(5)
 FLOAT, INT, BOOL, CHOICE = range(4)
@@ -24,6 +24,7 @@ EMIT_BOTH_SIDES, PHONG, GGX = 1, 2, 4
 POINT, SPOT, RECTANGLE, DISK, SUN = range(5)
 RADIOMETRIC, WATT = 0, 1
 ENVIRONMENT_HIDDEN = 1
+CHECKPOINTS, ILLUMINANCE, GROUPS = 1, 2, 4  # of RenderDesc.flags
 FOREVER = 0xFFFFFFFF
 
 
@@ -97,6 +98,11 @@ class Light(Descriptor):
                 ("tangent", c_float * 3)]
 
 
+class Profile(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("vertical_count", c_uint32), ("horizontal_count", c_uint32),
+                ("reserved", c_uint32), ("vertical", c_void_p), ("horizontal", c_void_p), ("values", c_void_p)]
+
+
 class Environment(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("group", c_uint32), ("color", c_float * 3), ("texture", c_int32),
                 ("world_to_map", c_float * 9), ("flags", c_uint32)]
@@ -136,8 +142,8 @@ class ChannelInfo(Descriptor):
 
 
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
-SIZES = {DeviceDesc: 32, Status: 64, SceneDesc: 16, Texture: 32, Material: 92, Mesh: 88, Light: 116, Environment: 64,
-         Camera: 92, IntegratorInfo: 40, ParamInfo: 72, RenderDesc: 72, Tile: 20, ChannelInfo: 24}
+SIZES = {DeviceDesc: 32, Status: 64, SceneDesc: 16, Texture: 32, Material: 92, Mesh: 88, Light: 116, Profile: 40,
+         Environment: 64, Camera: 92, IntegratorInfo: 40, ParamInfo: 72, RenderDesc: 72, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32
 HANDLE = c_void_p
@@ -154,6 +160,7 @@ FUNCTIONS = {
     "scene_set_materials": (RESULT, [HANDLE, POINTER(Material), c_uint64]),
     "scene_add_mesh": (RESULT, [HANDLE, POINTER(Mesh), POINTER(c_uint32)]),
     "scene_set_lights": (RESULT, [HANDLE, POINTER(Light), c_uint64]),
+    "scene_set_profiles": (RESULT, [HANDLE, POINTER(Profile), c_uint64]),
     "scene_set_environment": (RESULT, [HANDLE, POINTER(Environment)]),
     "scene_set_camera": (RESULT, [HANDLE, POINTER(Camera)]),
     "scene_commit": (RESULT, [HANDLE]),
@@ -167,6 +174,7 @@ FUNCTIONS = {
     "render_wait": (RESULT, [HANDLE, c_uint32, POINTER(Status)]),
     "render_next_tile": (RESULT, [HANDLE, POINTER(Tile)]),
     "render_read": (RESULT, [HANDLE, c_char_p, POINTER(Tile), c_void_p]),
+    "render_groups": (RESULT, [HANDLE, POINTER(POINTER(c_uint32)), POINTER(c_uint64)]),
 }
 
 
@@ -344,7 +352,18 @@ class Scene(Handle):
     def set_lights(self, lights):
         self._call("scene_set_lights", *_array(Light, lights))
 
-    def add_mesh(self, positions, indices, normals=None, uvs=None, materials=None, material=0, transforms=None):
+    def set_profiles(self, profiles):
+        """(vertical, horizontal, values) each, before the lights that name them: radians and W/sr, a row of `values` for
+        each horizontal angle."""
+        arrays = [[np.ascontiguousarray(a, np.float32) for a in profile] for profile in profiles]
+        items = [Profile(vertical_count=v.size, horizontal_count=h.size, vertical=v.ctypes.data,
+                         horizontal=h.ctypes.data, values=w.ctypes.data) for v, h, w in arrays]
+        for v, h, w in arrays:
+            if w.size != v.size * h.size:
+                raise Error(INVALID_ARGUMENT, f"profile: {w.size} values for {v.size} x {h.size} angles")
+        self._call("scene_set_profiles", *_array(Profile, items))
+
+    def add_mesh(self, positions, indices, normals=None, uvs=None, materials=None, material=0, transforms=None, group=0):
         positions, normals, uvs = _rows(positions, np.float32, 3), _rows(normals, np.float32, 3), _rows(uvs, np.float32, 2)
         indices, materials = _rows(indices, np.uint32, 3), _rows(materials, np.uint32, 1)
         transforms = _rows(transforms, np.float32, 12)
@@ -360,7 +379,7 @@ class Scene(Handle):
         mesh = Mesh(positions=address(positions), normals=address(normals), uvs=address(uvs),
                     vertex_count=len(positions), indices=address(indices), triangle_count=len(indices),
                     materials=address(materials), material=material, transforms=address(transforms),
-                    transform_count=0 if transforms is None else len(transforms))
+                    transform_count=0 if transforms is None else len(transforms), group=group)
         self._call("scene_add_mesh", ctypes.byref(mesh), ctypes.byref(c_uint32()))
 
     def set_environment(self, environment):
@@ -386,12 +405,16 @@ class Integrator(Handle):
 
 
 class Render(Handle):
-    """A frame that renders in the background. Tiles and crop count rows from the top."""
+    """A frame that renders in the background. Tiles and crop count rows from the top.
 
-    def __init__(self, integrator, scene, width, height, samples=1, crop=None, tile_size=0, passes=1):
+    `passes`, `max_seconds`, `target_error`, `confidence` and `flags` as in lumicut_render_desc."""
+
+    def __init__(self, integrator, scene, width, height, samples=1, crop=None, tile_size=0, passes=1, max_seconds=0.0,
+                 target_error=0.0, confidence=0.0, flags=0):
         super().__init__(integrator.library)
         self.crop = tuple(crop) if crop else (0, 0, width, height)
-        desc = RenderDesc(width=width, height=height, samples=samples, tile_size=tile_size, passes=passes)
+        desc = RenderDesc(width=width, height=height, samples=samples, tile_size=tile_size, passes=passes,
+                          max_seconds=max_seconds, target_error=target_error, confidence=confidence, flags=flags)
         desc.crop[:] = self.crop
         self.components = self.library.channels()
         self._create("render_start", integrator.pointer, scene.pointer, ctypes.byref(desc))
@@ -408,9 +431,15 @@ class Render(Handle):
         self._call("render_next_tile", ctypes.byref(tile))
         return (tile.x0, tile.y0, tile.x1, tile.y1) if tile.x1 else None
 
+    def groups(self):
+        """Light groups that have a channel "radiance.GROUP", rising."""
+        numbers, count = POINTER(c_uint32)(), c_uint64()
+        self._call("render_groups", ctypes.byref(numbers), ctypes.byref(count))
+        return [numbers[i] for i in range(count.value)]
+
     def read(self, channel, rect=None):
         """(height, width, components) float32, top row first."""
         x0, y0, x1, y1 = rect or self.crop
-        out = np.empty((y1 - y0, x1 - x0, self.components[channel]), np.float32)
+        out = np.empty((y1 - y0, x1 - x0, self.components[channel.partition(".")[0]]), np.float32)
         self._call("render_read", channel.encode(), ctypes.byref(Tile(x0=x0, y0=y0, x1=x1, y1=y1)), out.ctypes.data)
         return out

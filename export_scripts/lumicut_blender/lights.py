@@ -6,8 +6,10 @@ import bpy
 import numpy as np
 from mathutils import Euler
 
-from . import library
+from . import ies, library, sky
 from .nodes import Evaluator, Mapping, Picture, Value
+from .report import Report
+from .scene_data import Profile
 
 TYPES = {"POINT": library.POINT, "SPOT": library.SPOT, "SUN": library.SUN}
 AREA_TYPES = {"SQUARE": library.RECTANGLE, "RECTANGLE": library.RECTANGLE, "DISK": library.DISK, "ELLIPSE": library.DISK}
@@ -16,31 +18,186 @@ AREA_TYPES = {"SQUARE": library.RECTANGLE, "RECTANGLE": library.RECTANGLE, "DISK
 # Measured: Cycles 3.4.1 has L = P/4A, 4.3.2 L = P/πA (P watt in all, as its name says). Versions between were not
 # there to measure.
 AREA_IS_LAMBERTIAN = (4, 3, 0)
+# Measured against each version's Cycles: 3.x multiplies by the cosine to the axis, 4.x no longer does.
+SPOT_WITHOUT_COSINE = (4, 0, 0)
+# Measured: 3.4.1 interpolates IES files around the full circle, 4.3.2 takes 0 beyond 0 and 360 degrees, which makes them
+# up to 1/16 brighter in their first and last interval, and files that are the same all around 1/8.
+IES_WITHOUT_WRAP = (4, 3, 0)
+
+
+class Directions(Evaluator):
+    """Follows a vector input that is a direction, turned by Mapping nodes."""
+
+    plain = ()  # (type, output) of nodes that give the direction as it is
+
+    def direction(self, socket, stack):
+        """The rotation that an input applies to the direction; None: not followed."""
+        node, output, stack = self.source(socket, stack)
+        if node is None or (node.type, output.name) in self.plain:
+            return np.eye(3)
+        if node.type == "MAPPING":
+            inner = self.direction(node.inputs["Vector"], stack)
+            own_values = {n: node.inputs[n] for n in ("Location", "Rotation", "Scale") if n in node.inputs}
+            if inner is None or any(s.is_linked for s in own_values.values()):
+                return None
+            if "Location" in own_values and any(abs(c) > 1e-6 for c in own_values["Location"].default_value):
+                self.note("location", "Moves and scales of directions left out")
+            if any(abs(c - 1) > 1e-6 for c in own_values["Scale"].default_value):
+                self.note("scale", "Moves and scales of directions left out")
+            turn = np.array(Euler(own_values["Rotation"].default_value, "XYZ").to_matrix())
+            return (turn.T if node.vector_type == "TEXTURE" else turn) @ inner
+        return None
+
+
+class LampReader(Directions):
+    """A lamp's own nodes. An IES texture counts as `of_ies`, and is kept beside."""
+
+    plain = (("TEX_COORD", "Normal"),)
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self.of_ies, self.ies = 1.0, None  # (node, rotation)
+
+    def _tex_ies(self, node, output, stack):
+        if self.ies is not None and self.ies[0] != node:
+            self.note(node.name, "Several IES textures in one lamp, the first taken")
+            return Value(1)
+        rotation = self.direction(node.inputs["Vector"], stack)
+        if rotation is None:
+            self.note(node.name, "IES textures on other coordinates than Normal, taken as unturned")
+            rotation = np.eye(3)
+        self.ies = node, rotation
+        return Value(self.of_ies * self.number(node.inputs["Strength"], stack, "IES strength"))
 
 
 def emission_of(light, images, report):
-    """Colour times strength of a lamp's own nodes; 1 where it has none."""
+    """Colour times strength of a lamp's own nodes, 1 where it has none; and its IES texture, (node, rotation) or None."""
     if not light.use_nodes or light.node_tree is None:
-        return np.ones(3)
-    evaluator = Evaluator(light.name, images, report)
+        return np.ones(3), None
+    reader = LampReader(light.name, images, report)
     output = light.node_tree.get_output_node("CYCLES") or light.node_tree.get_output_node("ALL")
     if output is None:
-        return np.ones(3)
-    node, _, stack = evaluator.source(output.inputs["Surface"], ())
+        return np.ones(3), None
+    node, _, stack = reader.source(output.inputs["Surface"], ())
     if node is None:
-        return np.zeros(3)
+        return np.zeros(3), None
     if node.type != "EMISSION":
         report.note(f"{light.name} ({node.bl_label})", "Shaders of lamps taken as plain emission")
-        return np.ones(3)
-    v = evaluator.multiply(evaluator.value(node.inputs["Color"], stack), evaluator.value(node.inputs["Strength"], stack))
-    if v.picture is not None:
-        report.note(light.name, "Textures of lamps taken as their mean")
-    return np.maximum(v.mean(), 0)
+        return np.ones(3), None
+
+    def at(of_ies):
+        reader.of_ies = of_ies
+        v = reader.multiply(reader.value(node.inputs["Color"], stack), reader.value(node.inputs["Strength"], stack))
+        if v.picture is not None:
+            report.note(light.name, "Textures of lamps taken as their mean")
+        return v.mean()
+
+    v = at(1.0)
+    if reader.ies is not None and not (np.allclose(at(2.0), 2 * v) and np.allclose(at(0.5), 0.5 * v)):
+        report.note(light.name, "IES textures that nodes bend, taken as they are")
+    return np.maximum(v, 0), reader.ies
 
 
-def convert_light(name, light, matrix, images, report):
+class Profiles:
+    """Measured lamps of one scene, each table kept once."""
+
+    def __init__(self, report):
+        self.report, self.items = report, []
+        self._tables, self._numbers = {}, {}
+
+    def _table(self, node):
+        """(name, vertical, horizontal, candela) of an IES node's file, or None with a note."""
+        internal = node.mode == "INTERNAL"
+        if internal:
+            source = node.ies.name if node.ies is not None else ""
+        else:
+            source = bpy.path.abspath(node.filepath, library=node.id_data.library)
+        key = internal, source
+        if key not in self._tables:
+            table = None
+            try:
+                if not source:
+                    raise ies.IesError("there is none")
+                if internal:
+                    text = node.ies.as_string()
+                else:
+                    with open(source, encoding="latin-1") as file:
+                        text = file.read()
+                table = (source if internal else bpy.path.basename(source),
+                         *ies.resampled(*ies.parse(text), wraps=bpy.app.version < IES_WITHOUT_WRAP))
+            except (ies.IesError, OSError) as reason:
+                words = reason.strerror if isinstance(reason, OSError) else str(reason)
+                table = f"{source or node.name} ({words})"
+            self._tables[key] = table
+        return key, self._tables[key]
+
+    def add(self, name, light, node, rotation, matrix, out):
+        """Gives the point lamp `out` the node's file. False where it cannot be read."""
+        key, table = self._table(node)
+        if isinstance(table, str):
+            self.report.note(f"{name}: {table}", "Lamps whose IES file cannot be read left out")
+            return False
+        own = np.array(matrix, np.float64)[:3, :3]
+        # Looked up with -z as vertical angle 0, -y as horizontal angle 0, and on towards -x: seen from above the other
+        # way round than the library's, unless the lamp is mirrored.
+        axes = own / np.maximum(np.linalg.norm(own, axis=0), 1e-30) @ rotation.T
+        out.direction[:], out.tangent[:] = (-axes[:, 2]).tolist(), (-axes[:, 1]).tolist()
+        mirrored = np.linalg.det(axes) < 0
+        source, vertical, horizontal, candela = table
+        if light.type == "SPOT":
+            axis = rotation @ (0, 0, -1)  # of the cone, where the file is looked up
+            vertical, horizontal, candela = _cut_cone(vertical, horizontal, candela, axis, light)
+            key += (light.spot_size, light.spot_blend, tuple(axis.round(6)))
+            if not candela.any():
+                self.report.note(f"{name}: {source}", "IES files that give nothing within their spot's cone")
+                return False
+        if out.radius > 0:
+            self.report.note(name, "Lamps with IES files, taken as points without a radius")
+        out.radius, out.type = 0.0, library.POINT
+        key += (mirrored,)
+        if key not in self._numbers:
+            if not mirrored and len(horizontal) > 1:
+                horizontal, candela = 2 * math.pi - horizontal[::-1], candela[::-1]
+            self.items.append(Profile(source, vertical.astype(np.float32), horizontal.astype(np.float32),
+                                      (ies.PER_CANDELA * candela).astype(np.float32)))
+            self._numbers[key] = len(self.items)
+        out.profile = self._numbers[key]
+        return True
+
+
+def _cut_cone(vertical, horizontal, candela, axis, light):
+    """A table times the falloff of a spot whose axis lies towards `axis`."""
+    half = light.spot_size / 2
+    outer = math.cos(half)
+    width = (1 - outer) * light.spot_blend
+    along = axis[2] < -1 + 1e-6  # both axes are one: the edge lies at one vertical angle
+    if along:
+        soft = math.acos(min(1.0, outer + width))
+        finer = np.concatenate([np.linspace(soft, half, 65), np.arange(0, half, math.radians(1)), [half - 2e-5, half + 2e-5]])
+    else:
+        finer = np.linspace(0, math.pi, 361)
+        if len(horizontal) < 181:
+            values = candela if len(horizontal) > 1 else np.repeat(candela, 2, 0)
+            old, horizontal = np.linspace(0, 2 * math.pi, 2) if len(horizontal) == 1 else horizontal, np.linspace(0, 2 * math.pi, 361)
+            candela = np.stack([np.interp(horizontal, old, values[:, i]) for i in range(len(vertical))], 1)
+    angles = np.unique(np.concatenate([vertical, finer]).round(6))
+    angles = angles[(angles >= vertical[0]) & (angles <= vertical[-1]) & (angles <= half + 2e-5 if along else True)]
+    values = np.stack([np.interp(angles, vertical, row) for row in candela])
+    # As ies.py has it: -z at vertical angle 0, -y at horizontal angle 0, -x at 90 degrees.
+    s, c = np.sin(angles)[None], np.cos(angles)[None]
+    h = horizontal[:, None]
+    cosine = -axis[0] * s * np.sin(h) - axis[1] * s * np.cos(h) - axis[2] * c
+    x = np.clip((cosine - outer) / width, 0, 1) if width > 0 else (cosine > outer) * 1.0
+    falloff = x * x * (3 - 2 * x)
+    if bpy.app.version < SPOT_WITHOUT_COSINE:
+        falloff = falloff * np.maximum(0, cosine)
+    return angles, horizontal, values * falloff
+
+
+def convert_light(name, light, matrix, images, report, profiles):
     """A library.Light, or None for one that gives nothing."""
-    colour = np.array(light.color, np.float64) * emission_of(light, images, report)
+    emission, of_ies = emission_of(light, images, report)
+    colour = np.array(light.color, np.float64) * emission
     # 4.5 and later: exposure in stops, and a temperature that colours.
     value = light.energy * 2.0 ** getattr(light, "exposure", 0.0)
     if getattr(light, "use_temperature", False):
@@ -62,6 +219,9 @@ def convert_light(name, light, matrix, images, report):
     out.position[:] = m[:, 3].tolist()
     forward = -z / (np.linalg.norm(z) or 1.0)
     out.direction[:] = forward.tolist()
+    if of_ies is not None and light.type not in {"POINT", "SPOT"}:
+        report.note(name, "IES textures of lamps other than point and spot, taken as even")
+        of_ies = None
     if light.type == "AREA":
         out.type = AREA_TYPES[light.shape]
         height = light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
@@ -89,68 +249,88 @@ def convert_light(name, light, matrix, images, report):
     if light.type == "SPOT":
         out.angle = min(light.spot_size, math.pi)
         out.blend = light.spot_blend
-        # Measured against each version's Cycles: 3.x multiplies by the cosine to the axis, 4.x no longer does.
-        out.spot_cosine = 1 if bpy.app.version < (4, 0, 0) else 0
+        out.spot_cosine = 1 if bpy.app.version < SPOT_WITHOUT_COSINE else 0
+    if of_ies is not None:
+        if not profiles.add(name, light, *of_ies, matrix, out):
+            return None
+        out.angle, out.blend, out.spot_cosine = 0.0, 0.0, 0
     return out
 
 
-def convert_world(world, materials, report):
-    """A library.Environment, or None for black."""
+BY_RAY = "Worlds that differ by ray, taken as for lighting"
+WORLD_VOLUME = "World volumes left out"
+
+
+def convert_world(world, materials, report, bake=None):
+    """(library.Environment, or None for black; [(name, library.Light)] of suns that were in it).
+
+    `bake(world)` renders what cannot be read, see sky.py: it gives None where that is not to be had now."""
     if world is None:
-        return None
+        return None, []
+    own = Report()
+    colour, rotation = _read_world(world, materials, own)
+    baked, suns = None, []
+    if bake is not None and any(text not in {BY_RAY, WORLD_VOLUME} for text in own.texts()):
+        try:
+            baked = bake(world)
+        except sky.BakeError as reason:
+            report.note(f"{world.name} ({reason})", "Worlds that Cycles could not render into an image")
+    if baked is None:
+        report.take(own)
+    else:
+        height, width = baked.pixels.shape[:2]
+        report.note(world.name, f"Worlds rendered by Cycles into an image of {width} x {height}")
+        report.take(own, {BY_RAY, WORLD_VOLUME})
+        picture = Picture(f"{world.name} sky", (world.name_full, "baked", id(baked)), Mapping(), 0, linear=baked.pixels)
+        colour, rotation = Value(1, picture if baked.pixels.any() else None), np.eye(3)
+        if colour.picture is None:
+            colour = Value(0)
+        for towards, irradiance, angle in baked.suns:
+            most = float(irradiance.max())
+            sun = library.Light(type=library.SUN, unit=library.WATT, value=most, radius=angle / 2)
+            sun.color[:] = [float(c) / most for c in irradiance]
+            sun.direction[:] = [-float(c) for c in towards]
+            suns.append((f"{world.name} sun", sun))
     environment = library.Environment()
+    environment.color[:] = [max(0.0, float(c)) for c in colour.factor]
+    if not any(environment.color):
+        return None, suns
+    if colour.picture is not None:
+        environment.texture = materials.picture_number(colour.picture)
+        environment.world_to_map[:] = [float(v) for v in rotation.reshape(9)]
+    return environment, suns
+
+
+def _read_world(world, materials, report):
+    """(radiance, rotation of its image) as the nodes say, where they can be followed."""
     if not world.use_nodes or world.node_tree is None:
-        environment.color[:] = [max(0.0, float(c)) for c in world.color]
-        return environment if any(environment.color) else None
-    evaluator = Evaluator(world.name, materials.images, report)
+        return Value([max(0.0, float(c)) for c in world.color]), np.eye(3)
+    reader = WorldReader(world.name, materials.images, report)
     output = world.node_tree.get_output_node("CYCLES") or world.node_tree.get_output_node("ALL")
     node, stack = None, ()
     if output is not None:
         if output.inputs["Volume"].is_linked:
-            evaluator.note("world volume", "Volumes left out")
-        node, _, stack = evaluator.source(output.inputs["Surface"], ())
+            reader.note("", WORLD_VOLUME)
+        node, _, stack = reader.source(output.inputs["Surface"], ())
     if node is None:
-        return None
+        return Value(0), np.eye(3)
     if node.type != "BACKGROUND":
-        evaluator.note(node.bl_label, "Shaders of worlds other than Background left out")
-        return None
-    reader = WorldReader(world.name, materials.images, report)
+        reader.note(node.bl_label, "Shaders of worlds other than Background left out")
+        return Value(0), np.eye(3)
     colour = reader.multiply(reader.value(node.inputs["Color"], stack), reader.value(node.inputs["Strength"], stack))
-    environment.color[:] = [max(0.0, float(c)) for c in colour.factor]
-    if not any(environment.color):
-        return None
-    if colour.picture is not None:
-        environment.texture = materials.picture_number(colour.picture)
-        environment.world_to_map[:] = [float(v) for v in reader.rotation.reshape(9)]
-    return environment
+    if colour.picture is None:
+        return colour, np.eye(3)
+    return colour, reader.rotation if reader.rotation is not None else np.eye(3)
 
 
-class WorldReader(Evaluator):
+class WorldReader(Directions):
     """Environment textures, and the rotation that their vector has."""
+
+    plain = (("TEX_COORD", "Generated"), ("TEX_COORD", "Object"), ("NEW_GEOMETRY", "Position"))
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
-        self.rotation = np.eye(3)
-
-    def direction(self, socket, stack):
-        """world_to_map of a vector input; None: not followed."""
-        node, output, stack = self.source(socket, stack)
-        if node is None or (node.type == "TEX_COORD" and output.name in {"Generated", "Object"}):
-            return np.eye(3)
-        if node.type == "NEW_GEOMETRY" and output.name == "Position":
-            return np.eye(3)
-        if node.type == "MAPPING":
-            inner = self.direction(node.inputs["Vector"], stack)
-            own_values = {n: node.inputs[n] for n in ("Location", "Rotation", "Scale") if n in node.inputs}
-            if inner is None or any(s.is_linked for s in own_values.values()):
-                return None
-            if "Location" in own_values and any(abs(c) > 1e-6 for c in own_values["Location"].default_value):
-                self.note("location", "Moves and scales of the sky left out")
-            if any(abs(c - 1) > 1e-6 for c in own_values["Scale"].default_value):
-                self.note("scale", "Moves and scales of the sky left out")
-            turn = np.array(Euler(own_values["Rotation"].default_value, "XYZ").to_matrix())
-            return (turn.T if node.vector_type == "TEXTURE" else turn) @ inner
-        return None
+        self.rotation = None  # not met yet
 
     def _tex_environment(self, node, output, stack):
         if node.image is None:
@@ -164,6 +344,8 @@ class WorldReader(Evaluator):
         rotation = self.direction(node.inputs["Vector"], stack)
         if rotation is None:
             self.note(node.image.name, "Skies on unknown coordinates, taken as unturned")
+        elif self.rotation is not None and not np.allclose(rotation, self.rotation):
+            self.note(node.image.name, "Skies of several rotations, all turned as the first")
         else:
             self.rotation = rotation
 
@@ -178,5 +360,5 @@ class WorldReader(Evaluator):
         return Value((0.3, 0.45, 0.7))
 
     def _light_path(self, node, output, stack):
-        self.note("Light Path", "Worlds that differ by ray, taken as for lighting")
+        self.note("Light Path", BY_RAY)
         return Value(0.0)

@@ -129,7 +129,9 @@ class LUMICUT_PT_integrator(Panel, bpy.types.Panel):
         for p in properties.tables.group(settings.integrator):
             column.prop(getattr(settings, settings.integrator), p["id"])
         layout.prop(settings, "samples")
-        layout.prop(settings, "passes")
+        column = layout.column(align=True)
+        for name in properties.STOPS:
+            column.prop(settings, name)
 
 
 class LUMICUT_PT_lights(Panel, bpy.types.Panel):
@@ -224,8 +226,56 @@ class LUMICUT_PT_passes(Panel, bpy.types.Panel):
         column.prop(layer, "use_pass_position")
         column.prop(layer.lumicut, "use_pass_albedo")
         column = layout.column(heading="Heat Maps", align=True)
-        for prop in ("use_pass_cut_size", "use_pass_rays", "use_pass_bounds"):
+        for prop in ("use_pass_cut_size", "use_pass_rays", "use_pass_bounds", "use_pass_error", "use_pass_illuminance"):
             column.prop(layer.lumicut, prop)
+
+
+class LUMICUT_PT_light_groups(Panel, bpy.types.Panel):
+    bl_label = "Light Groups"
+    bl_context = "view_layer"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layer = context.view_layer
+        row = self.layout.row()
+        row.template_list("UI_UL_list", "lightgroups", layer, "lightgroups", layer, "active_lightgroup_index", rows=3)
+        column = row.column(align=True)
+        column.operator("scene.view_layer_add_lightgroup", icon="ADD", text="")
+        column.operator("scene.view_layer_remove_lightgroup", icon="REMOVE", text="")
+
+
+class LightGroup(Panel):
+    """Which light group of the view layer something emits into."""
+    bl_label = "Light Group"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        self.layout.use_property_split = True
+        self.layout.prop_search(self.owner(context), "lightgroup", context.view_layer, "lightgroups", text="Light Group")
+
+
+class LUMICUT_PT_object_light_group(LightGroup, bpy.types.Panel):
+    bl_context = "object"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.object is not None
+
+    @staticmethod
+    def owner(context):
+        return context.object
+
+
+class LUMICUT_PT_world_light_group(LightGroup, bpy.types.Panel):
+    bl_context = "world"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.world is not None
+
+    @staticmethod
+    def owner(context):
+        return context.world
 
 
 class LUMICUT_PT_film(Panel, bpy.types.Panel):
@@ -290,6 +340,7 @@ def menu(self, context):
 
 CLASSES = (LUMICUT_OT_preset, LUMICUT_OT_reload_library, LUMICUT_OT_export, LUMICUT_PT_integrator, LUMICUT_PT_lights,
            LUMICUT_PT_performance, LUMICUT_PT_statistics, LUMICUT_PT_notes, LUMICUT_PT_film, LUMICUT_PT_passes,
+           LUMICUT_PT_light_groups, LUMICUT_PT_object_light_group, LUMICUT_PT_world_light_group,
            LUMICUT_PT_light, LUMICUT_PT_material_viewport)
 
 

@@ -15,7 +15,12 @@ PASSES = {  # of the library's channels: pass name, property, label
     "cut_size": ("Lumicut Cut Size", "use_pass_cut_size", "Cut Size", "Heat map: clusters or lights summed, a sample", "X", "VALUE"),
     "rays": ("Lumicut Rays", "use_pass_rays", "Shadow Rays", "Heat map: shadow rays, a sample", "X", "VALUE"),
     "bounds": ("Lumicut Bounds", "use_pass_bounds", "Bounds", "Heat map: error bounds evaluated, a sample", "X", "VALUE"),
+    "error": ("Lumicut Error", "use_pass_error", "Error", "Half the width of the luminance's confidence interval, from the passes: 0 where there are fewer than two", "X", "VALUE"),
+    "illuminance": ("Lumicut Illuminance", "use_pass_illuminance", "Illuminance", "Lux on the side that is seen. Takes about as long again", "X", "VALUE"),
 }
+GROUP_PASS = "Combined_"  # of a light group, as Cycles names it
+
+STOPS = ("passes", "max_seconds", "target_error", "confidence")  # of lumicut_render_desc, under the same names
 
 PRESETS = {
     # name: (label, tooltip, own settings, integrator, parameters of whatever group has them)
@@ -23,8 +28,8 @@ PRESETS = {
               {"samples": 1}, "illumination_cut", {"vpls": 10000, "error": 0.05}),
     "good": ("Good", "For most images: antialiased, 60,000 lights, error about 2 %",
              {"samples": 9}, "illumination_cut", {"vpls": 60000, "error": 0.02}),
-    "reference": ("Reference", "Sums all of 200,000 lights at every point: slow, and the truth of many lights",
-                  {"samples": 16}, "exhaustive", {"vpls": 200000}),
+    "reference": ("Reference", "256 passes that each sum all of 4,000 lights anew, with what the clamp takes brought back: slow, and as path traced: corners, gloss and glass too",
+                  {"samples": 1, "passes": 256}, "exhaustive", {"vpls": 4000, "compensate": True}),
 }
 
 
@@ -82,10 +87,7 @@ _classes = []
 
 
 class LumicutViewLayerSettings(bpy.types.PropertyGroup):
-    use_pass_albedo: BoolProperty(name="Albedo", description=PASSES["albedo"][3])
-    use_pass_cut_size: BoolProperty(name="Cut Size", description=PASSES["cut_size"][3])
-    use_pass_rays: BoolProperty(name="Shadow Rays", description=PASSES["rays"][3])
-    use_pass_bounds: BoolProperty(name="Bounds", description=PASSES["bounds"][3])
+    __annotations__ = {prop: BoolProperty(name=label, description=text) for _, prop, label, text, _, _ in PASSES.values()}
 
 
 def parameters_of(settings, integrator=None):
@@ -103,7 +105,8 @@ def parameters_of(settings, integrator=None):
 
 def apply_preset(settings, name):
     _, _, own, integrator, values = PRESETS[name]
-    settings.property_unset("passes")
+    for key in STOPS:
+        settings.property_unset(key)
     for key, value in own.items():
         setattr(settings, key, value)
     known = [row[0] for row in tables.integrators]
@@ -126,8 +129,14 @@ def register():
     annotations = {
         "samples": IntProperty(name="Samples", description="Samples a pixel, for edges, texture and depth of field. One lies at the pixel's centre",
                                default=4, min=1, max=65536, soft_max=64),
-        "passes": IntProperty(name="Passes", description="Whole images with virtual lights of their own, averaged: with Compensate they converge to the path traced image",
-                              default=1, min=1, max=1 << 20, soft_max=64),
+        "passes": IntProperty(name="Passes", description="Whole images with virtual lights of their own, averaged: with Compensate they converge to the path traced image. 0: until stopped by what follows",
+                              default=1, min=0, max=1 << 20, soft_max=64),
+        "max_seconds": FloatProperty(name="Time Limit", description="Stop after the pass that ends nearest to this; 0: never",
+                                     default=0.0, min=0.0, max=1e9, unit="TIME_ABSOLUTE"),
+        "target_error": FloatProperty(name="Target Error", description="Stop after at least 8 passes, when the error is at most this share of a pixel's luminance, in as large a part of the pixels as Confidence says; 0: never",
+                                      default=0.0, min=0.0, max=1.0, precision=3, step=1),
+        "confidence": FloatProperty(name="Confidence", description="Of the interval of the pass Error and of Target Error",
+                                    default=0.95, min=0.5, max=0.999, precision=3, step=1),
         "accel": EnumProperty(name="Tree for Rays", description="What finds the triangles that rays hit", items=ACCELS, default="agglomerative"),
         "max_shininess": FloatProperty(name="Gloss Limit", description="Sharpest glossy lobe that lights shade, as Blinn's exponent: sharper ones, up to mirrors, show the virtual lights as blots",
                                        default=300.0, min=1.0, max=100000.0),

@@ -12,6 +12,15 @@ class Report:
         if name not in names:
             names.append(name)
 
+    def texts(self):
+        return list(self._notes)
+
+    def take(self, other, texts=None):
+        """What another report notes; `texts`: those alone."""
+        for text, names in other._notes.items():
+            for name in names if texts is None or text in texts else ():
+                self.note(name, text)
+
     def __bool__(self):
         return bool(self._notes)
 

@@ -25,6 +25,16 @@ class Mesh:
     materials: np.ndarray | None = None  # (t,) indices into the scene's; None: `material` for all
     material: int = 0
     transforms: list = dataclasses.field(default_factory=list)  # 3x4 each, one an instance
+    group: int = 0                       # light group of what it emits
+
+
+@dataclasses.dataclass
+class Profile:
+    """Intensity of a lamp by direction, as lumicut_profile has it."""
+    name: str
+    vertical: np.ndarray    # radians from the lamp's direction, rising
+    horizontal: np.ndarray  # radians about it, from 0 to 2π
+    values: np.ndarray      # (horizontal, vertical), W/sr
 
 
 def baked(mesh, check=lambda: None):
@@ -64,9 +74,11 @@ class SceneData:
     meshes: list = dataclasses.field(default_factory=list)
     materials: list = dataclasses.field(default_factory=list)  # (name, library.Material)
     images: list = dataclasses.field(default_factory=list)     # of materials' and environment's 1-based numbers
+    profiles: list = dataclasses.field(default_factory=list)   # of lights' 1-based numbers
     lights: list = dataclasses.field(default_factory=list)     # (name, library.Light)
     environment: library.Environment | None = None
     camera: library.Camera | None = None
+    groups: list = dataclasses.field(default_factory=list)     # names of light groups, from number 1; 0: in none
 
     def triangles(self):
         return sum(len(mesh.indices) * len(mesh.transforms) for mesh in self.meshes)
@@ -80,10 +92,11 @@ class SceneData:
             if len(mesh.transforms) == 1:
                 positions, normals, indices = baked(mesh, check)
                 check()
-                scene.add_mesh(positions, indices, normals, mesh.uvs, mesh.materials, mesh.material)
+                scene.add_mesh(positions, indices, normals, mesh.uvs, mesh.materials, mesh.material, group=mesh.group)
             else:
                 scene.add_mesh(mesh.positions, mesh.indices, mesh.normals, mesh.uvs, mesh.materials, mesh.material,
-                               np.array(mesh.transforms, np.float32))
+                               np.array(mesh.transforms, np.float32), mesh.group)
+        scene.set_profiles([(p.vertical, p.horizontal, p.values) for p in self.profiles])
         scene.set_lights([light for _, light in self.lights])
         scene.set_environment(self.environment)
         scene.set_camera(self.camera)

@@ -13,7 +13,7 @@ import gpu
 import numpy as np
 from gpu_extras.presets import draw_texture_2d
 
-from . import collect, library, properties, runtime
+from . import collect, library, properties, runtime, sky
 from .nodes import Images
 from .report import Report
 
@@ -59,7 +59,7 @@ class Session:
         settings = depsgraph.scene.lumicut
         try:
             data = collect.Collector(depsgraph, report, cache=self.cache, images=self.images,
-                                     max_shininess=settings.max_shininess).collect()
+                                     max_shininess=settings.max_shininess, bake=sky.bake_later).collect()
         except Exception as error:
             traceback.print_exc()
             self.message = f"collecting failed: {error}"
@@ -224,6 +224,7 @@ def scene_is_transparent(data):
 def _tick():
     """Redraws views that have news: drawing belongs to the interface's thread."""
     alive = False
+    fresh_sky = sky.poll()
     for session in list(_sessions):
         if session.closed:
             continue
@@ -232,6 +233,9 @@ def _tick():
         try:
             if engine is None:
                 session.close()
+            elif fresh_sky:
+                session.data = None  # collected anew at the next draw
+                engine.tag_redraw()
             elif session.shown != session.picture_number and session.picture is not None or session.message != session.told:
                 engine.tag_redraw()
         except ReferenceError:  # Blender has freed it
@@ -256,6 +260,7 @@ def forget(engine):
 
 
 def stop_all():
+    sky.stop_all()
     for session in list(_sessions):
         session.close(wait=True)
     if bpy.app.timers.is_registered(_tick):

@@ -100,9 +100,21 @@ class Tables(unittest.TestCase):
             self.assertEqual(settings.integrator, integrator)
             text = properties.parameters_of(settings)
             for key, value in values.items():
-                self.assertAlmostEqual(float(text[key]), value, places=6)
+                if isinstance(value, bool):
+                    self.assertEqual(text[key], str(value).lower())
+                else:
+                    self.assertAlmostEqual(float(text[key]), value, places=6)
             for key, value in own.items():
                 self.assertEqual(getattr(settings, key), value)
+
+    def test_presets_leave_no_stop_of_the_one_before(self):
+        settings = bpy.context.scene.lumicut
+        settings.max_seconds, settings.target_error, settings.confidence = 5, 0.1, 0.9
+        bpy.ops.lumicut.preset(preset="reference")
+        self.assertTrue(settings.common.compensate and settings.passes > 1)
+        bpy.ops.lumicut.preset(preset="good")
+        self.assertFalse(settings.common.compensate)
+        self.assertEqual((settings.passes, settings.max_seconds, settings.target_error), (1, 0, 0))
 
     def test_both_trees_give_the_same_image(self):
         import numpy as np

@@ -71,6 +71,15 @@ def rich_scene():
     h.add_light("POINT", (1, 1, 2), 40, shadow_soft_size=0.1)
     h.add_light("SPOT", (-1, -1, 3), 80, (0.3, 0.1, 0), spot_size=1.0, spot_blend=0.4, shadow_soft_size=0)
     h.add_light("SUN", (0, 0, 3), 0.7, (0.6, 0.4, 0), angle=0.05)
+    for kind, place, turn in (("POINT", (1.5, -1, 2), (0.3, 0.4, 0.5)), ("SPOT", (-1.5, 1, 2.5), (0, 0, 0.8))):
+        measured = h.add_light(kind, place, 60, turn, shadow_soft_size=0)
+        measured.data.use_nodes = True
+        tree = measured.data.node_tree
+        node = tree.nodes.new("ShaderNodeTexIES")
+        node.ies = bpy.data.texts.new("lobe/ö")
+        node.ies.write("IESNA:LM-63-1995\nTILT=NONE\n1 1000 1 3 4 1 2 0 0 0 1 1 0\n0 30 80\n0 90 180 270\n"
+                       "900 500 0\n900 700 0\n900 300 0\n900 100 0\n")
+        tree.links.new(node.outputs[0], next(n for n in tree.nodes if n.type == "EMISSION").inputs["Strength"])
     h.add_light("AREA", (2, 0, 2.5), 50, (0, 0.5, 0), shape="ELLIPSE", size=0.6, size_y=0.3, spread=2.0)
     tree = scene.world.node_tree
     background = next(n for n in tree.nodes if n.type == "BACKGROUND")

@@ -1,11 +1,13 @@
 """Frames: passes against Cycles, cameras, borders, transparency, several layers, colour of what is seen directly."""
 import math
+import re
 import unittest
 
 import bpy
 import numpy as np
 
 import helpers as h
+from lumicut_blender import engine
 
 
 def interior(a, b):
@@ -88,6 +90,106 @@ class Passes(unittest.TestCase):
         np.testing.assert_allclose(np.unique(albedo[hit][:, 0].round(3)), [0.5, 0.9])
         self.assertEqual(albedo[~hit].max(), 0)
         self.assertGreater(layers["Lumicut Cut Size"][hit].min(), 0)
+
+    def test_error_shrinks_with_passes_and_stops_them(self):
+        scene, layer = self.scene.lumicut, bpy.context.view_layer.lumicut
+        layer.use_pass_error = True
+        h.add_light("AREA", (0, 1, 3), 60, size=1.0)
+        errors = []
+        with h.quiet():
+            for passes in (1, 4, 16):
+                h.set_lumicut("exhaustive", vpls=60)
+                scene.passes = passes
+                errors.append(h.render()["Lumicut Error"].mean())
+            self.assertFalse(any("single pass" in note for note in h.last_notes()))
+            scene.passes, scene.target_error, scene.confidence = 0, 0.2, 0.9
+            said = []
+            cls = engine.LumicutEngine
+            saved, cls.say = cls.say, lambda this, *words: (said.append(words), saved(this, *words))
+            try:
+                h.render()
+            finally:
+                cls.say = saved
+        self.assertEqual(errors[0], 0)
+        self.assertGreater(errors[1], 0)
+        # Half an interval: Student's t of 4 against 16 passes, 3.18 to 2.13, over the root of their numbers.
+        self.assertLess(errors[2], errors[1])
+        values = h.last_stats()["stats"]["values"]
+        self.assertGreaterEqual(values["passes"], 8)
+        self.assertLessEqual(values["error"], 0.2)
+        texts = [words[0] for words in said]
+        self.assertTrue(any(re.match(r"pass [3-9], error [0-9.]+ %, ", text) for text in texts), texts[-3:])
+        shares = [words[1] for words in said if len(words) > 1 and words[0].startswith("pass")]
+        self.assertTrue(all(0 <= share <= 1 for share in shares))
+
+    def test_a_time_limit_ends_the_passes(self):
+        scene = self.scene.lumicut
+        with h.quiet():
+            h.set_lumicut("exhaustive", vpls=60)
+            scene.passes, scene.max_seconds = 0, 0.5
+            h.render()
+        self.assertGreater(h.last_stats()["stats"]["values"]["passes"], 1)
+
+    def test_illuminance_is_pi_times_radiance_over_albedo_in_lux(self):
+        bpy.context.view_layer.lumicut.use_pass_illuminance = True
+        with h.quiet():
+            h.set_lumicut("exhaustive", vpls=60, max_depth=0)
+            ours = h.render()
+        lux = ours["Lumicut Illuminance"][..., 0]
+        plane = (ours["Depth"][..., 0] < 1e9) & (np.abs(ours["Position"][..., 2] + 0.5) < 1e-3) & (ours["Combined"][..., 0] > 0.01)
+        self.assertGreater(plane.sum(), 100)
+        expected = 683 * np.pi * ours["Combined"][..., 0] / 0.5  # a grey plane under a white lamp
+        np.testing.assert_allclose(lux[plane], expected[plane], rtol=1e-3)
+
+    def groups(self):
+        """Two groups of lamps, an emissive mesh in the first, one lamp in none."""
+        layer = bpy.context.view_layer
+        for name in ("Key", "Room", "Empty"):
+            layer.lightgroups.add(name=name)
+        bpy.data.objects["POINT"].lightgroup = "Key"
+        lamp = h.add_plane(0.4, 2.5, h.emission(8, (1, 0.7, 0.4)), "Lamp")
+        lamp.lightgroup = "Key"
+        lamp.location.x = 1.5
+        h.add_light("AREA", (-1, 1, 3), 60, size=0.5).lightgroup = "Room"
+        h.add_light("SUN", energy=0.5, rotation=(0.4, 0.2, 0), angle=0.0)
+        h.set_world((0.1, 0.2, 0.3))
+        self.scene.world.lightgroup = "Room"
+
+    def test_light_groups_and_the_rest_sum_to_combined_and_agree_with_cycles(self):
+        self.groups()
+        rest = {}
+        cls = engine.LumicutEngine
+        saved = cls._write
+
+        def write(this, render, depsgraph, passes, crop, tile, height):
+            rest.update(numbers=render.groups(), image=render.read("radiance.0"))
+            saved(this, render, depsgraph, passes, crop, tile, height)
+
+        cls._write = write
+        try:
+            with h.quiet():
+                h.set_lumicut("exhaustive", 16, vpls=20000, max_depth=0, clamp_relative=0.001, direct_share=1.0)
+                ours = h.render()
+        finally:
+            cls._write = saved
+        self.assertEqual(rest["numbers"], [0, 1, 2])
+        total = ours["Combined_Key"] + ours["Combined_Room"] + rest["image"]
+        np.testing.assert_allclose(total, ours["Combined"][..., :3], rtol=1e-4, atol=1e-4)
+        self.assertEqual(ours["Combined_Empty"].max(), 0)
+        with h.quiet():
+            h.set_cycles(512)
+            cycles = h.render()
+        for name in ("Combined_Key", "Combined_Room"):
+            a, b = h.blocks(ours[name], 5), h.blocks(cycles[name], 5)
+            np.testing.assert_allclose(a.mean((0, 1)) / b.mean((0, 1)), 1, atol=0.02, err_msg=name)
+            self.assertGreater(b.mean(), 0.01)
+
+    def test_light_groups_are_listed_where_an_integrator_has_none(self):
+        self.groups()
+        with h.quiet():
+            h.set_lumicut("path_tracer", 1)
+            h.render()
+        self.assertTrue(any("Light groups left out" in note for note in h.last_notes()), h.last_notes())
 
     def test_a_border_is_cut_out_of_the_whole(self):
         render = self.scene.render
@@ -212,3 +314,37 @@ class Rooms(unittest.TestCase):
         self.assertTrue((ratio > 0.94).all() and (ratio < 1.01).all(), f"means against Cycles: {ratio}")
         middle = h.blocks(ours, 5)[1:-1, 1:-1].mean((0, 1)) / h.blocks(cycles, 5)[1:-1, 1:-1].mean((0, 1))
         np.testing.assert_allclose(middle, 1, atol=0.05)
+
+    def test_lamps_shine_through_a_glass_window_as_in_cycles_when_compensated(self):
+        """A lamp outside, a pane, a table, a glass ball. Shadow rays stop at glass: uncompensated a third and more is lost."""
+        scene = h.new_scene(32, 24)
+        scene.camera.location, scene.camera.rotation_euler = (0, -1.9, 1.2), (math.radians(85), 0, 0)
+        scene.camera.data.lens = 20
+        white, glass = h.diffuse((0.7, 0.7, 0.7), "white"), h.material("glass")
+        h.shader(glass, "ShaderNodeBsdfGlass", Roughness=0.0, IOR=1.45)
+
+        def box(name, low, high, material):
+            return h.add_mesh(name, [(x, y, z) for z in (low[2], high[2]) for x, y in
+                                     ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]))],
+                              [(3, 2, 1, 0), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)], material)
+
+        h.add_mesh("Room", [(x, y, z) for z in (0, 2.5) for x, y in ((-2, -2), (2, -2), (2, 2), (-2, 2))],
+                   [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (2, 6, 7, 3), (3, 7, 4, 0)], white)
+        for y0, y1, z0, z1 in ((-2, -1, 0, 2.5), (1, 2, 0, 2.5), (-1, 1, 0, 0.8), (-1, 1, 2, 2.5)):  # the wall about the window
+            h.add_mesh("Wall", [(2, y0, z0), (2, y1, z0), (2, y1, z1), (2, y0, z1)], [(0, 1, 2, 3)], white)
+        box("Pane", (1.98, -1, 0.8), (2, 1, 2), glass)
+        box("Table", (-1, 0, 0), (0.4, 1, 0.6), h.diffuse((0.6, 0.4, 0.2), "wood"))
+        h.add_sphere(0.3, (-0.3, 0.4, 0.9), glass, 48)
+        h.add_light("AREA", (3, 0, 1.4), 300, (0, math.pi / 2, 0), shape="RECTANGLE", size=2.2, size_y=3.0)
+        means = {}
+        with h.quiet():
+            h.set_cycles(400, 24)
+            cycles = h.radiance(h.render()).mean()
+            for compensate in (False, True):
+                h.set_lumicut("illumination_cut", 1, vpls=3000, error=0.05, compensate=compensate)
+                scene.lumicut.passes = 16
+                means[compensate] = h.radiance(h.render()).mean() / cycles
+        # The noise of 16 passes and of Cycles in the mean of 768 pixels: about 1 %, and caustics are rare and bright.
+        self.assertAlmostEqual(means[True], 1, delta=0.05)
+        self.assertLess(means[False], 0.8)
+        self.assertTrue(any("Glass" in note and "glass" in note for note in h.last_notes()), h.last_notes())

@@ -1,11 +1,14 @@
 """Every type of lamp gives what Cycles of the same Blender gives, in Blender's units: direct light on a diffuse plane."""
 import math
+import pathlib
+import tempfile
 import unittest
 
 import bpy
 import numpy as np
 
 import helpers as h
+from lumicut_blender import sky
 
 # Cycles at 512 samples and our 40,000 lights leave less than 0.3 % of noise in the mean of 1024 pixels.
 MEAN = 0.01
@@ -99,6 +102,78 @@ class LightUnits(unittest.TestCase):
         lamp.location = (2.2, 0, 0)  # out of the picture: lamps' own pixels are not the point
         self.agree()
 
+    def ies_lamp(self, kind="POINT", lobed=True, **values):
+        """A lamp with a measured lobe that has no symmetry, and its IES node."""
+        ob = h.add_light(kind, energy=100, shadow_soft_size=0, **values)
+        ob.data.use_nodes = True
+        tree = ob.data.node_tree
+        node = tree.nodes.new("ShaderNodeTexIES")
+        emission = next(n for n in tree.nodes if n.type == "EMISSION")
+        tree.links.new(node.outputs[0], emission.inputs["Strength"])
+        vertical, horizontal = range(0, 91, 10), range(0, 360 if lobed else 1, 45)
+        rows = [" ".join(f"{900 * math.cos(math.radians(v)) * (1 + 0.4 * math.sin(math.radians(3 * v + h_)) * (v > 0)):.3f}"
+                         for v in vertical) for h_ in horizontal]
+        text = "\n".join(["IESNA:LM-63-1995", "[TEST] lobe", "TILT=NONE", f"1 1000 0.5 {len(vertical)} {len(horizontal)} 1 2 0 0 0",
+                          "1.1 0.9 60", " ".join(map(str, vertical)), " ".join(map(str, horizontal)), *rows]) + "\n"
+        return ob, node, text
+
+    def test_ies_files_of_points_are_turned_and_scaled_as_cycles_does(self):
+        for location, rotation, scale in (((0, 0, 2), (0, 0, 0), (1, 1, 1)), ((1, -0.5, 2), (0.4, 0.6, 1.2), (1, 1, 1)),
+                                          ((0.5, 0, 2), (0.1, 0.2, 0.7), (-1, 1, 1))):
+            with self.subTest(rotation=rotation, scale=scale):
+                self.setUp()
+                _, node, text = self.ies_lamp(location=location, rotation=rotation, scale=scale)
+                node.ies = bpy.data.texts.new("lobe")
+                node.ies.write(text)
+                self.agree(block=0.05)  # nothing comes from above 90 degrees: an edge runs through the tilted ones' blocks
+                self.assertEqual(h.last_notes(), [])
+
+    def test_an_ies_file_outside_is_read_and_nodes_multiply_and_turn_it(self):
+        ob, node, text = self.ies_lamp(location=(0.3, 0, 2))
+        tree = ob.data.node_tree
+        coordinates, mapping, product = (tree.nodes.new(k) for k in ("ShaderNodeTexCoord", "ShaderNodeMapping", "ShaderNodeMath"))
+        mapping.inputs["Rotation"].default_value = (0.3, -0.2, 1.0)
+        tree.links.new(coordinates.outputs["Normal"], mapping.inputs["Vector"])
+        tree.links.new(mapping.outputs[0], node.inputs["Vector"])
+        node.inputs["Strength"].default_value = 0.7
+        product.operation = "MULTIPLY"
+        product.inputs[1].default_value = 1.5
+        tree.links.new(node.outputs[0], product.inputs[0])
+        tree.links.new(product.outputs[0], next(n for n in tree.nodes if n.type == "EMISSION").inputs["Strength"])
+        with tempfile.TemporaryDirectory() as folder:
+            node.mode, node.filepath = "EXTERNAL", folder + "/lobe.ies"
+            pathlib.Path(node.filepath).write_text(text)
+            self.agree(block=0.05)
+        self.assertEqual(h.last_notes(), [])
+
+    def test_ies_files_of_spots_are_cut_by_the_cone(self):
+        for lobed, blend, turn in ((False, 0.6, 0.0), (True, 0.3, 0.5)):
+            with self.subTest(lobed=lobed, blend=blend, turn=turn):
+                self.setUp()
+                ob, node, text = self.ies_lamp("SPOT", lobed, location=(0, 0, 2.5), spot_size=math.radians(80), spot_blend=blend)
+                node.ies = bpy.data.texts.new("lobe")
+                node.ies.write(text)
+                if turn:
+                    mapping = ob.data.node_tree.nodes.new("ShaderNodeMapping")
+                    coordinates = ob.data.node_tree.nodes.new("ShaderNodeTexCoord")
+                    mapping.inputs["Rotation"].default_value = (turn, 0, 0)
+                    ob.data.node_tree.links.new(coordinates.outputs["Normal"], mapping.inputs["Vector"])
+                    ob.data.node_tree.links.new(mapping.outputs[0], node.inputs["Vector"])
+                self.agree(block=0.05)
+
+    def test_ies_files_that_cannot_be_mapped_are_listed_by_name(self):
+        _, node, _ = self.ies_lamp(location=(0, 0, 2))
+        node.ies = bpy.data.texts.new("broken")
+        node.ies.write("nothing of the kind")
+        other, _, text = self.ies_lamp("SUN")
+        with h.quiet():
+            h.set_lumicut("exhaustive", vpls=100)
+            image = h.radiance(h.render())
+        notes = "\n".join(h.last_notes())
+        self.assertRegex(notes, "Lamps whose IES file cannot be read left out: POINT: broken .*TILT")
+        self.assertRegex(notes, "IES textures of lamps other than point and spot, taken as even: SUN")
+        self.assertGreater(np.median(image), 0)  # the sun is there
+
     def test_world_colour(self):
         h.set_world((0.4, 0.6, 0.9), 1.5)
         self.agree()
@@ -128,6 +203,76 @@ class LightUnits(unittest.TestCase):
                 plane.rotation_euler = tilt
                 # All pixels share one random set of directions: 160,000 leave 0.4 % of noise in the mean.
                 self.agree(lights=160000)
+
+    def world_nodes(self, *kinds):
+        tree = bpy.context.scene.world.node_tree
+        return (tree.links, next(n for n in tree.nodes if n.type == "BACKGROUND"), *(tree.nodes.new(kind) for kind in kinds))
+
+    def narrow_images(self):
+        """Half as wide as users have them, to spare time."""
+        self.addCleanup(setattr, sky, "WIDTH", sky.WIDTH)
+        sky.WIDTH = 512
+
+    def test_skies_of_all_models_are_cycles_own_with_the_sun_as_a_lamp(self):
+        self.narrow_images()
+        links, background, node = self.world_nodes("ShaderNodeTexSky")
+        links.new(node.outputs[0], background.inputs["Color"])
+        plane = bpy.data.objects["Plane"]
+        kinds = [item.identifier for item in node.bl_rna.properties["sky_type"].enum_items]
+        self.assertGreaterEqual(len(kinds), 3)
+        for kind in kinds:
+            # A board throws the sun's shadow: nothing of the sun may be left in the image, which knows no edge that fine.
+            board = h.add_plane(0.8, 1.0, h.diffuse(), "Board")
+            node.sky_type = kind
+            node.sun_elevation, node.sun_rotation, node.sun_size = 0.6, 0.9, 0.05
+            node.sun_direction = (0.5, 0.3, 0.6)
+            node.sun_intensity, background.inputs["Strength"].default_value = 0.8, 0.1
+            plane.rotation_euler = (0.2, 0, 0)
+            with self.subTest(kind=kind):
+                self.agree(samples=256, block=0.08, lights=40000)
+                self.assertRegex("\n".join(h.last_notes()), "Worlds rendered by Cycles into an image of 512 x 256: World")
+                self.assertEqual(h.last_stats()["scene"]["lamps"], 1 if "NISHITA" in kind or "SCATTERING" in kind else 0)
+            bpy.data.objects.remove(board)
+
+    def test_worlds_of_any_nodes_come_as_cycles_has_them_and_are_rendered_once(self):
+        self.narrow_images()
+        links, background, mix, other, noise, ramp, ray = self.world_nodes(
+            "ShaderNodeMixShader", "ShaderNodeBackground", "ShaderNodeTexNoise", "ShaderNodeValToRGB", "ShaderNodeLightPath")
+        noise.inputs["Scale"].default_value = 2
+        ramp.color_ramp.elements[1].color = (1, 0.6, 0.2, 1)
+        links.new(noise.outputs["Fac"], ramp.inputs[0])
+        links.new(ramp.outputs["Color"], background.inputs["Color"])
+        other.inputs["Color"].default_value = (0, 0, 9, 1)
+        links.new(ray.outputs["Is Camera Ray"], mix.inputs[0])  # what the camera alone sees lights nothing
+        links.new(background.outputs[0], mix.inputs[1])
+        links.new(other.outputs[0], mix.inputs[2])
+        output = next(n for n in bpy.context.scene.world.node_tree.nodes if n.type == "OUTPUT_WORLD")
+        links.new(mix.outputs[0], output.inputs["Surface"])
+        begun = []
+        saved, sky.Process = sky.Process, lambda *words: (begun.append(words), saved(*words))[1]
+        try:
+            self.agree(block=0.05)
+            self.agree(samples=64, block=0.1)
+            self.assertEqual(len(begun), 1)
+            ramp.color_ramp.elements[1].color = (0.2, 0.6, 1, 1)
+            self.agree(block=0.05)
+            self.assertEqual(len(begun), 2)
+        finally:
+            sky.Process = saved
+
+    def test_a_world_that_cycles_cannot_render_is_listed_with_the_reason(self):
+        links, background, noise = self.world_nodes("ShaderNodeTexNoise")
+        links.new(noise.outputs["Color"], background.inputs["Color"])
+        saved, sky.WIDTH = sky.WIDTH, 0
+        try:
+            with h.quiet():
+                h.set_lumicut("exhaustive", vpls=100)
+                h.render()
+        finally:
+            sky.WIDTH = saved
+        notes = "\n".join(h.last_notes())
+        self.assertRegex(notes, r"could not render into an image: World \(.*Error")
+        self.assertIn("Nodes taken as a constant colour", notes)
 
     def test_a_lamp_among_others_keeps_its_share(self):
         h.add_light("POINT", (1, 1, 2), 60, shadow_soft_size=0)
