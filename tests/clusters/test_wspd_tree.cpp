@@ -217,7 +217,7 @@ TEST(WspdTree, SavedTreesComeBackAndDamageIsFound) {
       const WspdTree t = WspdTree::load(bad);
       for (uint32_t n = 0; n < t.nodes().size(); ++n) {
         for (const uint32_t v : t.pairs(n)) EXPECT_LT(v, t.nodes().size());
-        for (const Vpl& g : t.groups(t.node(n))) EXPECT_LT(static_cast<uint32_t>(g.kind), 4u);
+        for (const Vpl& g : t.groups(t.node(n))) EXPECT_LT(static_cast<uint32_t>(g.kind), uint32_t{kVplKinds});
       }
     } catch (const Error&) {
     }

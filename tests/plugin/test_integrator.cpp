@@ -109,7 +109,9 @@ TEST(Integrators, SpheresGoOutAndComeInAgainWithTheirRadii) {
   const auto wider = first.lights();
   ASSERT_EQ(wider.size(), lights.size());
   for (size_t i = 0; i < lights.size(); ++i)
-    if (lights[i].kind == LUMICUT_VPL_SPHERE) EXPECT_FLOAT_EQ(wider[i].cos_outer, 2 * lights[i].cos_outer);
+    if (lights[i].kind == LUMICUT_VPL_SPHERE) {
+      EXPECT_FLOAT_EQ(wider[i].cos_outer, 2 * lights[i].cos_outer);
+    }
 }
 
 TEST(Integrators, PointsOfAHostAreNotTakenForSpheres) {
