@@ -79,7 +79,10 @@ class Material(Descriptor):
                 ("specular", c_float * 3), ("opacity", c_float), ("emission", c_float * 3),
                 ("diffuse_texture", c_int32), ("specular_texture", c_int32), ("opacity_texture", c_int32),
                 ("emission_texture", c_int32), ("roughness", c_float), ("metallic", c_float), ("ior", c_float),
-                ("transmission", c_float), ("normal_texture", c_int32), ("normal_strength", c_float)]
+                ("transmission", c_float), ("normal_texture", c_int32), ("normal_strength", c_float),
+                ("height_texture", c_int32), ("bump_distance", c_float), ("bump_strength", c_float),
+                ("roughness_texture", c_int32), ("metallic_texture", c_int32), ("coat", c_float),
+                ("coat_roughness", c_float), ("coat_ior", c_float)]
 
 
 class Mesh(Descriptor):
@@ -136,7 +139,7 @@ class ChannelInfo(Descriptor):
 
 
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
-SIZES = {DeviceDesc: 32, Status: 64, SceneDesc: 16, Texture: 32, Material: 92, Mesh: 88, Light: 116, Environment: 64,
+SIZES = {DeviceDesc: 32, Status: 64, SceneDesc: 16, Texture: 32, Material: 124, Mesh: 88, Light: 116, Environment: 64,
          Camera: 92, IntegratorInfo: 40, ParamInfo: 72, RenderDesc: 72, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32
