@@ -100,12 +100,15 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
     // Spheres stand for all that is reflected evenly.
     point.diffuse = point.diffuse * (spheres_ ? 0.0f : lost);
     // Chance decides by what the surface still shows, so that few points cost a whole sum of lights.
-    const Rgb shown = Bsdf(point).albedo() * weights[i];
-    const float survive = std::min(1.0f, max_component(shown));
-    if (!(rngs[i].next_float() < survive)) continue;
-    const Rgb factor = weights[i] / survive;
-    point.attenuate(factor);
-    hits.found.push_back(point);
+    const auto add = [&](SurfacePoint& found) {
+      const Rgb shown = Bsdf(found).albedo() * weights[i];
+      const float survive = std::min(1.0f, max_component(shown));
+      if (!(rngs[i].next_float() < survive)) return;
+      found.attenuate(weights[i] / survive);
+      hits.found.push_back(found);
+    };
+    add(point);
+    if (auto coat = scene_.coat_point(surface, to_viewer, pixels[i])) add(*coat);
   }
   follow_chains(scene_, lamp_surfaces_, std::move(chains), hits, counters);
   return hits;

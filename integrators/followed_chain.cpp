@@ -47,6 +47,10 @@ void follow_chains(const Scene& scene, const LampSurfaces& lamps, std::vector<Ch
       SurfacePoint point = scene.shade_point(surface, to_viewer, chain.pixel);
       point.attenuate(chain.throughput);
       if (!Bsdf(point).black()) hits.found.push_back(point);
+      if (auto coat = scene.coat_point(surface, to_viewer, chain.pixel)) {
+        coat->attenuate(chain.throughput);
+        hits.found.push_back(*coat);
+      }
       if (auto ray = start_chain(scene, surface, to_viewer, chain.throughput, chain.pixel, chain.rng))
         next.push_back(*ray);
     }

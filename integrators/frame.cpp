@@ -68,6 +68,7 @@ class Batch {
     sums_.resize(pixels_.size());
     std::vector<SurfacePoint> found(pixels_.size() * samples);
     std::vector<uint8_t> hit(found.size(), 0);
+    std::vector<std::optional<SurfacePoint>> coats(scene_.coated() ? found.size() : 0);
     std::vector<std::optional<ChainRay>> chain(lamps_ != nullptr ? found.size() : 0);
     parallel_chunks(pixels_.size(), std::max<size_t>(1, 1024 / samples), [&](size_t begin, size_t end) {
       std::vector<RayHit> rays((end - begin) * samples);
@@ -79,12 +80,20 @@ class Batch {
         const size_t p = begin + i / samples;
         const size_t at = begin * samples + i;
         hit[at] = first_hit(rays[i], p, cosines[i], found[at]);
-        if (lamps_ != nullptr && hit[at] != 0) chain[at] = mirrored(rays[i], p, i % samples);
+        if (hit[at] == 0) continue;
+        if (!coats.empty())
+          coats[at] = scene_.coat_point(scene_.surface(rays[i]), -rays[i].ray.dir, static_cast<uint32_t>(p));
+        if (lamps_ != nullptr) chain[at] = mirrored(rays[i], p, i % samples);
       }
     });
     points_.reserve(found.size());
-    for (size_t i = 0; i < found.size(); ++i)
-      if (hit[i] != 0) points_.push(found[i]);
+    for (size_t i = 0; i < found.size(); ++i) {
+      if (hit[i] == 0) continue;
+      points_.push(found[i]);
+      if (coats.empty()) continue;
+      coat_.push_back(false);
+      if (coats[i]) points_.push(*coats[i]), coat_.push_back(true);
+    }
     points_.finish();
     std::vector<ChainRay> rays;
     for (const auto& ray : chain)
@@ -107,6 +116,7 @@ class Batch {
     ShadePoints white;
     white.reserve(points_.size());
     for (size_t i = 0; i < points_.size(); ++i) {
+      if (!coat_.empty() && coat_[i]) continue;  // its place has a point of its own
       SurfacePoint point = points_.get(i);
       point.diffuse = Rgb{1, 1, 1} * std::numbers::inv_pi_v<float>, point.specular = point.grazing = {};
       point.shininess = point.fade = 0.0f;
@@ -247,7 +257,7 @@ class Batch {
   // What a mirror or glass there goes on to show.
   std::optional<ChainRay> mirrored(const RayHit& ray, size_t p, size_t sample) const {
     const SurfaceHit surface = scene_.surface(ray);
-    if (!scene_.materials()[surface.material].followed()) return {};
+    if (!scene_.followed(surface)) return {};
     const auto [x, y] = pixels_[p];
     return start_chain(scene_, surface, -ray.ray.dir, {1, 1, 1}, static_cast<uint32_t>(p),
                        Rng(hash64(options_.seed, sample), Stage::eye_ray, x, y));
@@ -264,6 +274,7 @@ class Batch {
   std::vector<Pixel> pixels_;
   std::vector<PixelSums> sums_;
   ShadePoints points_;
+  std::vector<bool> coat_;               // of each point, where the scene has any: whether it is a coat's lobe
   EyeHits seen_;                         // by way of mirrors and glass
   std::vector<std::vector<Rgb>> light_;  // of each method: reflected, summed over a pixel's samples
   std::vector<float> illuminance_;       // summed over a pixel's samples

@@ -189,12 +189,13 @@ class PathTracer final : public Integrator {
     path.point = scene_->shade_point(surface, to_viewer, path.point.pixel);
     Rgb factor = path.weight;
     path.followed = false;
-    if (scene_->materials()[surface.material].followed()) {
+    auto coat = scene_->coat_point(surface, to_viewer, path.point.pixel);
+    if (scene_->followed(surface)) {
       const float choice = path.rng.next_float(), u = path.rng.next_float(), v = path.rng.next_float();
       const float either = path.rng.next_float();
       const auto f = lumicut::follow(*scene_, surface, to_viewer, choice, u, v);
       // Half of the paths each way, where there are two.
-      const float share = Bsdf(path.point).black() ? 1.0f : 0.5f;
+      const float share = Bsdf(path.point).black() && !coat ? 1.0f : 0.5f;
       if (either < share) {
         if (!f) return false;
         path.followed = true;
@@ -203,6 +204,13 @@ class PathTracer final : public Integrator {
         return survives(path, depth, path.weight, path.weight);
       }
       factor = factor / (1.0f - share);
+    }
+    if (coat) {  // the coat's lobe or what is beneath, by what they reflect
+      const float above = max_component(Bsdf(*coat).albedo()), below = max_component(Bsdf(path.point).albedo());
+      const float share = above / (above + below);
+      const bool chosen = path.rng.next_float() < share;
+      if (chosen) path.point = *coat;
+      factor = factor / (chosen ? share : 1.0f - share);
     }
     if (!survives(path, depth, Bsdf(path.point).albedo() * factor, factor)) return false;
     path.point.attenuate(factor);

@@ -274,6 +274,9 @@ class SceneReader {
     number("metallic", m.metallic, 0, 1, ggx);
     number("ior", m.ior, 0.1, 10, ggx);
     number("transmission", m.transmission, 0, 1, ggx);
+    number("coat", m.coat, 0, 1, ggx);
+    number("coat_roughness", m.coat_roughness, 0, 1, ggx);
+    number("coat_ior", m.coat_ior, 1, 10, ggx);
     if (auto both = object.find("emit_both_sides"))
       m.flags =
           (m.flags & ~uint32_t{LUMICUT_EMIT_BOTH_SIDES}) | (both->boolean() ? uint32_t{LUMICUT_EMIT_BOTH_SIDES} : 0u);
@@ -305,6 +308,19 @@ class SceneReader {
     texture("normal_texture", m.normal_texture, TextureUse::vectors);
     if (auto strength = object.find("normal_strength"))
       m.normal_strength = static_cast<float>(strength->number(1e-3, 10));
+    texture("height_texture", m.height_texture, TextureUse::numbers);
+    if (auto distance = object.find("bump_distance")) {
+      m.bump_distance = static_cast<float>(distance->number(-1e6, 1e6) * scale_);
+      if (m.bump_distance == 0.0f) distance->fail("is 0: leave \"height_texture\" out instead");
+    } else if (m.bump_distance == 0.0f) {
+      m.bump_distance = static_cast<float>(scale_);
+    }
+    if (auto strength = object.find("bump_strength")) m.bump_strength = static_cast<float>(strength->number(1e-3, 10));
+    for (const char* key : {"roughness_texture", "metallic_texture"})
+      if (auto given = object.find(key); given && !ggx && !given->raw().is_null())
+        given->fail("is of the model \"ggx\" alone");
+    texture("roughness_texture", m.roughness_texture, TextureUse::numbers);
+    texture("metallic_texture", m.metallic_texture, TextureUse::numbers);
   }
 
   void read_materials(const JsonValue& value) {

@@ -34,7 +34,9 @@ Texture read_texture(const std::string& path, TextureUse use, uint32_t flags, co
   texture.width = static_cast<uint32_t>(spec.width);
   texture.height = static_cast<uint32_t>(spec.height);
   texture.flags = flags;
-  const bool integers = !spec.format.is_floating_point() && use != TextureUse::radiance;
+  // Heights of 16 bits lose their slopes in 8.
+  const bool fine = use == TextureUse::numbers && spec.format.basesize() > 1;
+  const bool integers = !spec.format.is_floating_point() && use != TextureUse::radiance && !fine;
   const int in = spec.nchannels;
   int first = 0;
   int out = in >= 3 ? 3 : 1;

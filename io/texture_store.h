@@ -13,6 +13,7 @@ enum class TextureUse {
   colour,   // integer images hold sRGB, float images linear values; grey or red, green and blue
   mask,     // one linear channel: the alpha of images that have one, else the first channel
   vectors,  // linear, three channels: normal maps
+  numbers,  // linear, of up to 32 bits: heights, roughness, share of metal
   radiance  // an environment: linear floats, finite and not negative
 };
 

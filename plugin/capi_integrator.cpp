@@ -159,10 +159,17 @@ lumicut_result lumicut_integrator_shade(lumicut_integrator integrator, const lum
         const auto [first, last] = batches[b];
         ShadePoints batch;
         batch.reserve(last - first);
-        append_points(scene, points, first, last, batch);
+        const std::vector<uint64_t> starts = append_points(scene, points, first, last, batch);
         batch.finish();
-        std::vector<Rgb> light(last - first);
+        std::vector<Rgb> light(batch.size());
         p.method->shade(batch, light, {}, {*progress, *i.stats});
+        for (size_t k = 0; k < starts.size(); ++k) {
+          const size_t end = k + 1 < starts.size() ? starts[k + 1] : light.size();
+          Rgb sum = light[starts[k]];
+          for (size_t of = starts[k] + 1; of < end; ++of) sum += light[of];
+          light[k] = sum;
+        }
+        light.resize(last - first);
         std::memcpy(radiance + 3 * first, light.data(), light.size() * sizeof(Rgb));
       });
     });

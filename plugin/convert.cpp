@@ -73,6 +73,9 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   c.range("metallic", in.metallic, 0.0f, 1.0f);
   if (in.ior != 0.0f) c.range("ior", in.ior, 0.1f, 10.0f);
   c.range("transmission", in.transmission, 0.0f, 1.0f);
+  c.range("coat", in.coat, 0.0f, 1.0f);
+  c.range("coat_roughness", in.coat_roughness, 0.0f, 1.0f);
+  if (in.coat_ior != 0.0f) c.range("coat_ior", in.coat_ior, 1.0f, 10.0f);
   Material m;
   m.diffuse = vec(in.diffuse);
   m.specular = vec(in.specular);
@@ -81,6 +84,8 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   if ((in.flags & LUMICUT_GGX) != 0) m.lobe = LobeModel::ggx;
   m.roughness = in.roughness, m.metallic = in.metallic, m.transmission = in.transmission;
   m.ior = in.ior == 0.0f ? 1.5f : in.ior;
+  m.coat = in.coat, m.coat_roughness = in.coat_roughness;
+  m.coat_ior = in.coat_ior == 0.0f ? 1.5f : in.coat_ior;
   m.opacity = in.opacity == 0.0f ? 1.0f : in.opacity;
   m.emission = vec(in.emission);
   m.emit_both_sides = (in.flags & LUMICUT_EMIT_BOTH_SIDES) != 0;
@@ -89,6 +94,13 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   m.normal_texture = texture_index(c, "normal_texture", in.normal_texture);
   c.range("normal_strength", in.normal_strength, 0.0f, 10.0f);
   m.normal_strength = in.normal_strength == 0.0f ? 1.0f : in.normal_strength;
+  m.height_texture = texture_index(c, "height_texture", in.height_texture);
+  c.range("bump_distance", in.bump_distance, -1e6f, 1e6f);
+  m.bump_distance = in.bump_distance == 0.0f ? 1.0f : in.bump_distance;
+  c.range("bump_strength", in.bump_strength, 0.0f, 10.0f);
+  m.bump_strength = in.bump_strength == 0.0f ? 1.0f : in.bump_strength;
+  m.roughness_texture = texture_index(c, "roughness_texture", in.roughness_texture);
+  m.metallic_texture = texture_index(c, "metallic_texture", in.metallic_texture);
   m.opacity_texture = texture_index(c, "opacity_texture", in.opacity_texture);
   m.emission_texture = texture_index(c, "emission_texture", in.emission_texture);
   return m;
@@ -415,12 +427,19 @@ void check_points(const Scene& scene, const lumicut_point* points, uint64_t coun
   });
 }
 
-void append_points(const Scene& scene, const lumicut_point* points, uint64_t first, uint64_t last, ShadePoints& out) {
+std::vector<uint64_t> append_points(const Scene& scene, const lumicut_point* points, uint64_t first, uint64_t last,
+                                    ShadePoints& out) {
+  std::vector<uint64_t> starts;
   for (uint64_t i = first; i < last; ++i) {
     const lumicut_point& p = points[i];
-    out.push(scene.shade_point(vec(p.position), normalize(vec(p.geometric_normal)), normalize(vec(p.normal)),
-                               {p.u, p.v}, p.material, normalize(vec(p.to_viewer)), p.pixel));
+    const Vec3f position = vec(p.position), geometric = normalize(vec(p.geometric_normal)),
+                normal = normalize(vec(p.normal)), to_viewer = normalize(vec(p.to_viewer));
+    if (scene.coated()) starts.push_back(out.size());
+    out.push(scene.shade_point(position, geometric, normal, {p.u, p.v}, p.material, to_viewer, p.pixel));
+    if (const auto coat = scene.coat_point(position, geometric, normal, p.material, to_viewer, p.pixel))
+      out.push(*coat);
   }
+  return starts;
 }
 
 FrameOptions to_frame_options(const lumicut_render_desc& in) {

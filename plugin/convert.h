@@ -35,8 +35,10 @@ std::vector<Transform> to_transforms(const float* m, uint64_t count, const char*
 // A host's lights. Normals within 1 % of unit length are made unit.
 VplSet to_vpls(const lumicut_vpl* lights, uint64_t count);
 
-// Points [first, last) of a host, checked against the scene's materials and appended to `out`.
-void append_points(const Scene& scene, const lumicut_point* points, uint64_t first, uint64_t last, ShadePoints& out);
+// Points [first, last) of a host, checked against the scene's materials and appended to `out`, where a clear coat's
+// lobe follows its point. Where the scene has any: the place of each point in `out`; else empty.
+std::vector<uint64_t> append_points(const Scene& scene, const lumicut_point* points, uint64_t first, uint64_t last,
+                                    ShadePoints& out);
 void check_points(const Scene& scene, const lumicut_point* points, uint64_t count);
 
 // Size, crop, samples and tiles. Fails where the film is larger than the machine's memory.

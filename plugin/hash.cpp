@@ -32,9 +32,12 @@ uint64_t scene_hash(const Scene& scene) {
   const auto add = [&](const Vec3f& v) { values.insert(values.end(), {v.x, v.y, v.z}); };
   for (const Material& m : scene.materials()) {
     add(m.diffuse), add(m.specular), add(m.emission);
-    values.insert(values.end(), {m.shininess, m.opacity, static_cast<float>(m.diffuse_texture),
-                                 static_cast<float>(m.lobe), m.roughness, m.metallic, m.ior, m.transmission,
-                                 m.normal_strength, static_cast<float>(m.normal_texture)});
+    values.insert(values.end(),
+                  {m.shininess, m.opacity, static_cast<float>(m.diffuse_texture), static_cast<float>(m.lobe),
+                   m.roughness, m.metallic, m.ior, m.transmission, m.normal_strength,
+                   static_cast<float>(m.normal_texture), static_cast<float>(m.height_texture), m.bump_distance,
+                   m.bump_strength, static_cast<float>(m.roughness_texture), static_cast<float>(m.metallic_texture),
+                   m.coat, m.coat_roughness, m.coat_ior});
   }
   for (const Light& l : scene.lights()) {
     add(l.value), add(l.position), add(l.direction), add(l.u), add(l.v);

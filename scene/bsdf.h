@@ -18,6 +18,26 @@ inline float schlick_share(float cosine) {
   return (m * m) * (m * m) * m;
 }
 
+// Reflectance of a smooth border for a cosine of incidence; `ratio`: index beyond over index before; `refracted`: the
+// cosine beyond, 0 in total reflection. [Fresnel]
+inline float fresnel_reflectance(float cosine, float ratio, float& refracted) {
+  refracted = 0.0f;
+  const float sine2 = (1.0f - cosine * cosine) / (ratio * ratio);
+  if (sine2 >= 1.0f) return 1.0f;
+  refracted = std::sqrt(1.0f - sine2);
+  const float s = (cosine - ratio * refracted) / (cosine + ratio * refracted),
+              p = (ratio * cosine - refracted) / (ratio * cosine + refracted);
+  return 0.5f * (s * s + p * p);
+}
+
+// Of what is seen along visible half vectors, the share that facets towards the light do not mask: reflected, where
+// heights are correlated, and through the surface. Cosines to the normal.
+inline float masking_reflected(float alpha2, float nv, float nl) {
+  const float root_v = ggx_root(alpha2, nv), root_l = ggx_root(alpha2, nl);
+  return nl * (nv + root_v) / (nl * root_v + nv * root_l);
+}
+inline float masking_transmitted(float alpha2, float nl) { return 2.0f * nl / (nl + ggx_root(alpha2, nl)); }
+
 struct GgxTerms {
   float distribution;  // D(h)
   float visibility;    // masking over 4 (n·v)(n·l)

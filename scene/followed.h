@@ -14,16 +14,13 @@ struct Followed {
   bool transmitted = false;
 };
 
-// One direction out of the surface's followed lobes: metal and coats of α below kLeastAlpha, and glass, which reflects
-// or refracts by chance of its Fresnel reflectance. `choice`, `u`, `v` in [0, 1). Empty where the material has no such
-// lobe, or where the light is lost in it. What Scene::shade_point makes of the same hit leaves these lobes out: light
-// to the viewer is the sum of both. Weights are at most 1; solid angles that refraction narrows are not in them, since
-// a closed body widens them again.
+// One direction out of the surface's followed lobes: metal, dielectric and clear coats of α below kLeastAlpha, and
+// glass, which reflects or refracts by chance of its Fresnel reflectance. `choice`, `u`, `v` in [0, 1). Empty where the
+// material has no such lobe, or where the light is lost in it. What Scene::shade_point makes of the same hit leaves
+// these lobes out: light to the viewer is the sum of both. The mean weight is at most 1 (of one direction through rough
+// glass it may be more: what others lose is given back); solid angles that refraction narrows are not in it, since a
+// closed body widens them again.
 std::optional<Followed> follow(const Scene& scene, const SurfaceHit& hit, const Vec3f& to_viewer, float choice, float u,
                                float v);
-
-// Reflectance of a smooth border for a cosine of incidence; `ratio`: index beyond over index before; `refracted`: the
-// cosine beyond, 0 in total reflection. [Fresnel]
-float fresnel_reflectance(float cosine, float ratio, float& refracted);
 
 }  // namespace lumicut

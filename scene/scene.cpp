@@ -56,6 +56,22 @@ void Scene::set_textures(std::vector<Texture> textures) {
   committed_ = false;
 }
 void Scene::set_materials(std::vector<Material> materials) {
+  std::vector<std::shared_ptr<const GlassAlbedo>> glass(materials.size());
+  const auto known = [&](float ior) {
+    for (const auto* list : {&glass_, &glass})
+      for (const auto& g : *list)
+        if (g && g->ior() == ior) return g;
+    return std::shared_ptr<const GlassAlbedo>();
+  };
+  bool coated = false;
+  for (size_t i = 0; i < materials.size(); ++i) {
+    const Material& m = materials[i];
+    coated = coated || m.rough_coat();
+    if (m.lobe != LobeModel::ggx || !(m.transmission > 0.0f) || !(m.roughness > 0.0f)) continue;
+    glass[i] = known(m.ior);
+    if (!glass[i]) glass[i] = std::make_shared<const GlassAlbedo>(m.ior);
+  }
+  glass_ = std::move(glass), coated_ = coated;
   materials_ = std::move(materials);
   committed_ = false;
 }
@@ -119,6 +135,9 @@ void Scene::check_references() const {
     check_texture(materials_[i].opacity_texture, i, "opacity_texture");
     check_texture(materials_[i].emission_texture, i, "emission_texture");
     check_texture(materials_[i].normal_texture, i, "normal_texture");
+    check_texture(materials_[i].height_texture, i, "height_texture");
+    check_texture(materials_[i].roughness_texture, i, "roughness_texture");
+    check_texture(materials_[i].metallic_texture, i, "metallic_texture");
   }
   if (environment_.texture >= 0 && static_cast<size_t>(environment_.texture) >= textures_.size())
     fail_argument("environment.texture = " + std::to_string(environment_.texture) + " is out of range: the scene has " +
@@ -239,10 +258,28 @@ SurfaceHit Scene::surface(const RayHit& rh) const {
   if (!mesh.uvs.empty()) {
     const Vec2f a = mesh.uvs[tri[0]], b = mesh.uvs[tri[1]], c = mesh.uvs[tri[2]];
     s.uv = {a.x * w + b.x * hit.u + c.x * hit.v, a.y * w + b.y * hit.u + c.y * hit.v};
-    if (const Material& material = materials_[s.material]; material.normal_texture >= 0)
+    if (const Material& material = materials_[s.material]; material.normal_texture >= 0 || material.height_texture >= 0)
       s.normal = mapped_normal(material, s, {p[1] - p[0], p[2] - p[0]}, {a, b, c});
   }
   return s;
+}
+
+// Blinn's bumps: the height along the normal, by its slope over a texel. [Blinn 1978; as Blender has it: the distance
+// scales the slope, the strength mixes the turned normal with the old.]
+Vec3f Scene::bumped_normal(const Material& material, const Vec3f& normal, Vec2f uv, const Vec3f& along_u,
+                           const Vec3f& along_v) const {
+  const Texture& heights = textures_[material.height_texture];
+  const float du = 1.0f / static_cast<float>(heights.width()), dv = 1.0f / static_cast<float>(heights.height());
+  const auto height = [&](float u, float v) { return luminance(heights.color(u, v)); };
+  const float slope_u = (height(uv.x + 0.5f * du, uv.y) - height(uv.x - 0.5f * du, uv.y)) / du,
+              slope_v = (height(uv.x, uv.y + 0.5f * dv) - height(uv.x, uv.y - 0.5f * dv)) / dv;
+  const Vec3f across_v = cross(along_v, normal);
+  const float det = dot(along_u, across_v);
+  const Vec3f gradient = across_v * slope_u + cross(normal, along_u) * slope_v;
+  const float sign = det < 0.0f ? -1.0f : 1.0f;
+  const Vec3f turned = normalize(normal * std::abs(det) - gradient * (sign * material.bump_distance));
+  if (turned == Vec3f{} || !is_finite(turned)) return normal;
+  return normalize(normal + (turned - normal) * material.bump_strength);
 }
 
 // The tangent is the triangle's own direction of growing u, laid into the shading normal's plane: seams of the map
@@ -253,18 +290,21 @@ Vec3f Scene::mapped_normal(const Material& material, const SurfaceHit& hit, cons
       d2{corners[2].x - corners[0].x, corners[2].y - corners[0].y};
   const float det = d1.x * d2.y - d2.x * d1.y;
   if (!(std::abs(det) > 0.0f)) return hit.normal;
-  const float sign = det < 0.0f ? -1.0f : 1.0f;
-  const Vec3f along_u = (edges[0] * d2.y - edges[1] * d1.y) * sign,
-              along_v = (edges[1] * d1.x - edges[0] * d2.x) * sign;
-  const Vec3f t = normalize(along_u - hit.normal * dot(along_u, hit.normal));
-  if (t == Vec3f{} || !is_finite(t)) return hit.normal;
-  Vec3f b = cross(hit.normal, t);
-  if (dot(b, along_v) < 0.0f) b = -b;
-  const Rgb c = textures_[material.normal_texture].color(hit.uv.x, hit.uv.y);
-  const Vec3f local = normalize(Vec3f{2.0f * c.x - 1.0f, 2.0f * c.y - 1.0f, std::max(0.0f, 2.0f * c.z - 1.0f)});
-  if (local == Vec3f{}) return hit.normal;
-  const Vec3f bent = t * local.x + b * local.y + hit.normal * local.z;
-  Vec3f n = normalize(hit.normal + (bent - hit.normal) * material.normal_strength);
+  const Vec3f along_u = (edges[0] * d2.y - edges[1] * d1.y) / det, along_v = (edges[1] * d1.x - edges[0] * d2.x) / det;
+  if (!is_finite(along_u) || !is_finite(along_v)) return hit.normal;
+  Vec3f n = hit.normal;
+  if (material.normal_texture >= 0) {
+    const Vec3f t = normalize(along_u - hit.normal * dot(along_u, hit.normal));
+    if (t == Vec3f{} || !is_finite(t)) return hit.normal;
+    Vec3f b = cross(hit.normal, t);
+    if (dot(b, along_v) < 0.0f) b = -b;
+    const Rgb c = textures_[material.normal_texture].color(hit.uv.x, hit.uv.y);
+    const Vec3f local = normalize(Vec3f{2.0f * c.x - 1.0f, 2.0f * c.y - 1.0f, std::max(0.0f, 2.0f * c.z - 1.0f)});
+    if (local == Vec3f{}) return hit.normal;
+    const Vec3f bent = t * local.x + b * local.y + hit.normal * local.z;
+    n = normalize(hit.normal + (bent - hit.normal) * material.normal_strength);
+  }
+  if (material.height_texture >= 0) n = bumped_normal(material, n, hit.uv, along_u, along_v);
   // Not below the surface itself.
   constexpr float kLeast = 0.02f;
   if (const float up = dot(n, hit.geometric_normal); up < kLeast)
@@ -295,20 +335,59 @@ SurfacePoint Scene::shade_point(const Vec3f& position, const Vec3f& geometric_no
   return p;
 }
 
-void Scene::set_ggx(const Material& material, const GgxColors& colors, const Vec3f& to_viewer, SurfacePoint& p) const {
-  // Bent shading normals may turn from the viewer: seen edge-on then.
+namespace {
+// Sets what the view direction is mirrored to; its cosine. Bent shading normals may turn from the viewer: seen edge-on
+// then.
+float set_mirror(const Vec3f& to_viewer, SurfacePoint& p) {
   constexpr float kEdge = 0.01f;
   float cosine = dot(p.normal, to_viewer);
   Vec3f view = to_viewer;
   if (cosine < kEdge) view = normalize(view + p.normal * (kEdge - cosine)), cosine = kEdge;
   p.mirror = normalize(reflect(view, p.normal));
-  const float alpha = std::max(kLeastAlpha, material.alpha());
-  const GgxBase base = ggx_base(colors, material.alpha());
-  const float m = 1.0f - std::min(1.0f, cosine);
-  p.diffuse = base.scale * ((1.0f - base.fade * (m * m) * (m * m)) * kInvPi);
+  return cosine;
+}
+}  // namespace
+
+void Scene::set_ggx(const Material& material, const GgxColors& colors, const Vec3f& to_viewer, SurfacePoint& p) const {
+  const float cosine = set_mirror(to_viewer, p);
+  const GgxBase base = ggx_base(colors, cosine);
+  p.diffuse = base.scale * kInvPi;
   p.fade = base.fade;
-  p.shininess = -alpha;
-  if (material.alpha() >= kLeastAlpha) p.specular = colors.specular, p.grazing = Rgb{1, 1, 1} * colors.grazing;
+  p.shininess = -std::max(kLeastAlpha, colors.alpha);
+  if (colors.alpha >= kLeastAlpha) p.specular = colors.specular, p.grazing = Rgb{1, 1, 1} * colors.grazing;
+  if (!(material.coat > 0.0f)) return;
+  // The diffuse part gets what the coat leaves of the light's directions on the average, the lobe what it leaves of the
+  // view's: that of the light too, where the lobe is a mirror's.
+  const LobeRest rest = clear_coat(material).rest;
+  const float shown = rest.at(cosine);
+  p.fade = product_fade(base.fade, rest.fade);
+  p.diffuse *= shown * mean_of_fading(base.fade) / mean_of_fading(p.fade);
+  p.specular *= shown, p.grazing *= shown;
+}
+
+std::optional<SurfacePoint> Scene::coat_point(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const {
+  return coat_point(hit.position, hit.geometric_normal, hit.normal, hit.material, to_viewer, pixel);
+}
+
+std::optional<SurfacePoint> Scene::coat_point(const Vec3f& position, const Vec3f& geometric_normal, const Vec3f& normal,
+                                              uint32_t material_index, const Vec3f& to_viewer, uint32_t pixel) const {
+  const Material& material = materials_[material_index];
+  if (!material.rough_coat()) return {};
+  const bool behind = dot(geometric_normal, to_viewer) < 0.0f;
+  SurfacePoint p;
+  p.position = position + geometric_normal * (behind ? -epsilon_ : epsilon_);
+  p.normal = behind ? -normal : normal;
+  p.pixel = pixel;
+  set_mirror(to_viewer, p);
+  const ClearCoat coat = clear_coat(material);
+  p.shininess = -material.coat_alpha();
+  p.specular = Rgb{1, 1, 1} * coat.f0, p.grazing = Rgb{1, 1, 1} * coat.f90;
+  return p;
+}
+
+bool Scene::followed(const SurfaceHit& hit) const {
+  const Material& m = materials_[hit.material];
+  return m.followed() && (m.smooth_coat() || ggx_colors(hit.material, hit.uv).followed());
 }
 
 Rgb Scene::diffuse_texel(const Material& m, Vec2f uv) const {
@@ -322,7 +401,7 @@ Rgb Scene::specular_texel(const Material& m, Vec2f uv) const {
 Rgb Scene::diffuse_color(uint32_t material, Vec2f uv) const {
   const Material& m = materials_[material];
   const Rgb color = diffuse_texel(m, uv);
-  return m.lobe == LobeModel::ggx ? color * ((1.0f - m.metallic) * (1.0f - m.transmission)) : color;
+  return m.lobe == LobeModel::ggx ? color * ((1.0f - metallic_of(m, uv)) * (1.0f - m.transmission)) : color;
 }
 
 Rgb Scene::specular_color(uint32_t material, Vec2f uv) const {
@@ -330,13 +409,22 @@ Rgb Scene::specular_color(uint32_t material, Vec2f uv) const {
   return m.lobe == LobeModel::ggx ? ggx_colors(material, uv).specular : specular_texel(m, uv);
 }
 
+float Scene::metallic_of(const Material& m, Vec2f uv) const {
+  if (m.metallic_texture < 0) return m.metallic;
+  return std::min(1.0f, std::max(0.0f, m.metallic * textures_[m.metallic_texture].color(uv.x, uv.y).z));
+}
+
 GgxColors Scene::ggx_colors(uint32_t material, Vec2f uv) const {
   const Material& m = materials_[material];
   GgxColors c;
   c.base = diffuse_texel(m, uv);
-  c.metal = m.metallic;
-  c.clear = (1.0f - m.metallic) * m.transmission;
-  c.opaque = (1.0f - m.metallic) * (1.0f - m.transmission);
+  c.metal = metallic_of(m, uv);
+  c.clear = (1.0f - c.metal) * m.transmission;
+  c.opaque = (1.0f - c.metal) * (1.0f - m.transmission);
+  float roughness = m.roughness;
+  if (m.roughness_texture >= 0)
+    roughness *= std::min(1.0f, std::max(0.0f, textures_[m.roughness_texture].color(uv.x, uv.y).y));
+  c.alpha = roughness * roughness;
   const float r = (m.ior - 1.0f) / (m.ior + 1.0f);
   c.f0 = specular_texel(m, uv) * (r * r);
   c.specular = c.base * c.metal + c.f0 * c.opaque;

@@ -4,11 +4,13 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "accel/accel.h"
 #include "scene/camera.h"
+#include "scene/facet_albedo.h"
 #include "scene/light.h"
 #include "scene/material.h"
 #include "scene/shade_points.h"
@@ -103,10 +105,22 @@ class Scene final : private HitFilter {
   // The same for a host's own point. `material` must be in range (checked by the caller).
   SurfacePoint shade_point(const Vec3f& position, const Vec3f& geometric_normal, const Vec3f& normal, Vec2f uv,
                            uint32_t material, const Vec3f& to_viewer, uint32_t pixel) const;
+  // Above the point to shade: the lobe of a rough clear coat. What the surface shows is the sum of both.
+  std::optional<SurfacePoint> coat_point(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const;
+  std::optional<SurfacePoint> coat_point(const Vec3f& position, const Vec3f& geometric_normal, const Vec3f& normal,
+                                         uint32_t material, const Vec3f& to_viewer, uint32_t pixel) const;
+  // Whether any material has a rough clear coat.
+  bool coated() const { return coated_; }
+  // Whether paths follow a lobe of that place (scene/followed.h).
+  bool followed(const SurfaceHit& hit) const;
   // kd and ks; of GGX materials what is diffuse beneath the coat, and F0 of metal and coat.
   Rgb diffuse_color(uint32_t material, Vec2f uv) const;
   Rgb specular_color(uint32_t material, Vec2f uv) const;
   GgxColors ggx_colors(uint32_t material, Vec2f uv) const;
+  // Share of the light that single reflection and refraction at glass keep. (scene/facet_albedo.h)
+  float glass_albedo(uint32_t material, bool inside, float alpha, float cosine) const {
+    return glass_[material] ? glass_[material]->at(inside, alpha, cosine) : 1.0f;
+  }
   // Radiance emitted by a surface towards `to_viewer`.
   Rgb emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const;
   // Share of rays that a place of a triangle stops: factor times mask.
@@ -118,18 +132,24 @@ class Scene final : private HitFilter {
   Vec2f environment_uv(const Vec3f& direction) const;
 
  private:
-  // `edges`: from the triangle's first corner to the others. `corners`: its uvs.
+  // By the height texture, then the normal texture. `edges`: from the triangle's first corner to the others.
+  // `corners`: its uvs.
   Vec3f mapped_normal(const Material& material, const SurfaceHit& hit, const Vec3f (&edges)[2],
                       const Vec2f (&corners)[3]) const;
+  Vec3f bumped_normal(const Material& material, const Vec3f& normal, Vec2f uv, const Vec3f& along_u,
+                      const Vec3f& along_v) const;
   Rgb diffuse_texel(const Material& material, Vec2f uv) const;
   Rgb specular_texel(const Material& material, Vec2f uv) const;
   void set_ggx(const Material& material, const GgxColors& colors, const Vec3f& to_viewer, SurfacePoint& point) const;
+  float metallic_of(const Material& material, Vec2f uv) const;
   bool passes(uint32_t mesh, uint32_t prim, float u, float v) const override;
   void check_references() const;
 
   Config config_;
   std::vector<Texture> textures_;
   std::vector<Material> materials_;
+  std::vector<std::shared_ptr<const GlassAlbedo>> glass_;  // of rough glass; one for each index of refraction
+  bool coated_ = false;
   std::vector<Mesh> meshes_;
   std::vector<Light> lights_;
   Environment environment_;

@@ -30,15 +30,17 @@ struct PathVpl {
   Vpl vpl;
 };
 
-// Goes on from a GGX surface, along a followed lobe or by the reflectance that point lights shade. `wo`: back along the
-// path. False: it ends here.
+// Goes on from a GGX surface, along a followed lobe or by the reflectance that point lights shade: that of a rough
+// clear coat or what is beneath. `wo`: back along the path. False: it ends here.
 bool scatter_ggx(const Scene& scene, const SurfaceHit& surface, const SurfacePoint& point, const Vec3f& wo,
                  LightPath& path) {
   const float choice = path.rng.next_float(), u = path.rng.next_float(), v = path.rng.next_float();
   const float lobe = path.rng.next_float();
   const auto followed = follow(scene, surface, wo, lobe, u, v);
   const float qf = followed ? std::min(1.0f, max_component(followed->weight)) : 0.0f;
-  const float qs = std::min(1.0f, max_component(Bsdf(point).albedo()));
+  const auto coat = scene.coat_point(surface, wo, 0);
+  const float beneath = max_component(Bsdf(point).albedo()), above = coat ? max_component(Bsdf(*coat).albedo()) : 0.0f;
+  const float qs = std::min(1.0f, beneath + above);
   const float survive = std::min(1.0f, qf + qs);
   if (!(choice < survive)) return false;
   const float p_followed = survive * qf / (qf + qs);
@@ -46,11 +48,13 @@ bool scatter_ggx(const Scene& scene, const SurfaceHit& surface, const SurfacePoi
     path.origin = followed->origin, path.direction = followed->direction;
     path.flux = path.flux * followed->weight * (1.0f / p_followed);
   } else {
-    const BsdfSample s = Bsdf(point).sample(lobe, u, v);
+    const float share = coat ? above / (above + beneath) : 0.0f;
+    const bool chosen = coat && path.rng.next_float() < share;
+    const BsdfSample s = Bsdf(chosen ? *coat : point).sample(lobe, u, v);
     const bool behind = dot(surface.geometric_normal, wo) < 0.0f;
     if (!(s.pdf > 0.0f) || (dot(s.direction, surface.geometric_normal) < 0.0f) != behind) return false;
     path.origin = point.position, path.direction = s.direction;
-    path.flux = path.flux * s.weight * (1.0f / (survive - p_followed));
+    path.flux = path.flux * s.weight * (1.0f / ((survive - p_followed) * (chosen ? share : 1.0f - share)));
   }
   return max_component(path.flux) > 0.0f && is_finite(path.flux);
 }

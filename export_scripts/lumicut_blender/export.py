@@ -164,6 +164,12 @@ class Writer:
             out["model"] = "ggx"
             for key in ("roughness", "metallic", "ior", "transmission"):
                 out[key] = numbers([getattr(m, key)])[0]
+            if m.coat > 0:
+                for key in ("coat", "coat_roughness", "coat_ior"):
+                    out[key] = numbers([getattr(m, key)])[0]
+            for key in ("roughness_texture", "metallic_texture"):
+                if getattr(m, key):
+                    out[key] = self.texture(getattr(m, key), "vectors")
         else:
             out["shininess"] = numbers([m.shininess])[0]
         if m.flags & library.PHONG:
@@ -176,6 +182,10 @@ class Writer:
         if m.normal_texture:
             out["normal_texture"] = self.texture(m.normal_texture, "vectors")
             out["normal_strength"] = numbers([m.normal_strength])[0]
+        if m.height_texture:
+            out["height_texture"] = self.texture(m.height_texture, "vectors")
+            for key in ("bump_distance", "bump_strength"):
+                out[key] = numbers([getattr(m, key)])[0]
         for slot, use in (("diffuse", "colour"), ("specular", "colour"), ("emission", "colour"), ("opacity", "mask")):
             number = getattr(m, slot + "_texture")
             if number:

@@ -80,7 +80,10 @@ class Material(Descriptor):
                 ("specular", c_float * 3), ("opacity", c_float), ("emission", c_float * 3),
                 ("diffuse_texture", c_int32), ("specular_texture", c_int32), ("opacity_texture", c_int32),
                 ("emission_texture", c_int32), ("roughness", c_float), ("metallic", c_float), ("ior", c_float),
-                ("transmission", c_float), ("normal_texture", c_int32), ("normal_strength", c_float)]
+                ("transmission", c_float), ("normal_texture", c_int32), ("normal_strength", c_float),
+                ("height_texture", c_int32), ("bump_distance", c_float), ("bump_strength", c_float),
+                ("roughness_texture", c_int32), ("metallic_texture", c_int32), ("coat", c_float),
+                ("coat_roughness", c_float), ("coat_ior", c_float)]
 
 
 class Mesh(Descriptor):
@@ -142,7 +145,7 @@ class ChannelInfo(Descriptor):
 
 
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
-SIZES = {DeviceDesc: 32, Status: 64, SceneDesc: 16, Texture: 32, Material: 92, Mesh: 88, Light: 116, Profile: 40,
+SIZES = {DeviceDesc: 32, Status: 64, SceneDesc: 16, Texture: 32, Material: 124, Mesh: 88, Light: 116, Profile: 40,
          Environment: 64, Camera: 92, IntegratorInfo: 40, ParamInfo: 72, RenderDesc: 72, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32
@@ -334,7 +337,7 @@ class Scene(Handle):
     def __init__(self, device, accel="agglomerative"):
         super().__init__(device.library)
         self.device = device
-        self._create("scene_create", device.pointer, ctypes.byref(SceneDesc(accel=accel.encode())))
+        self._create("scene_create", device.pointer, ctypes.byref(SceneDesc(robust=1, accel=accel.encode())))
 
     def set_textures(self, textures):
         """(pixels, flags) each: pixels (h, w, channels) of uint8 or float32, top row first."""

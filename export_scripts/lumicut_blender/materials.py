@@ -34,12 +34,59 @@ def ior_of(reflectance):
     return (1 + root) / (1 - root)
 
 
-def dimming(f0, alpha):
-    """Mean share of light that the library's coat leaves to the diffuse part: twin of ggx_base in scene/material.h."""
+def dimming(f0, alpha, f90=None):
+    """Mean share of light that the library's lobe leaves to what is beneath: twin of lobe_rest in scene/material.h."""
     a2 = alpha * alpha
     left = 1 - f0 * (1 - 1.643 * a2 / (1 + 2.248 * a2))
-    fade = min(1, (min(1, 50 * f0) / (1 + 8 * alpha + 5 * a2) + 0.4 * f0 * a2) / left)
+    fade = min(1, ((min(1, 50 * f0) if f90 is None else f90) / (1 + 8 * alpha + 5 * a2) + 0.4 * f0 * a2) / left)
     return left * (1 - fade / 15)
+
+
+# Mean share of even light that single reflection at GGX facets loses, by α: twin of mean_facet_loss in
+# scene/facet_albedo.h; and about what balls of metal lose in Cycles 3.4, which masks view and light each by itself.
+ALPHAS = (0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1)
+LOSSES = (0, 0.006, 0.0318, 0.0842, 0.1532, 0.2269, 0.3, 0.3697, 0.4341, 0.4925, 0.5449, 0.5913)
+LOSSES_APART = (0, 0.006, 0.032, 0.087, 0.157, 0.233, 0.309, 0.385, 0.456, 0.524, 0.584, 0.638)
+
+
+def single_scattering(colour, alpha):
+    """Colour of a metal that with the library's multiple scattering reflects, of even light, what `colour` reflects
+    without: with F the mean of Schlick's Fresnel, F (1 − L)/(1 − F L) instead of F (1 − L)."""
+    lost = np.interp(alpha, ALPHAS, LOSSES)
+    wanted = np.interp(alpha, ALPHAS, LOSSES_APART if bpy.app.version < (4, 0, 0) else LOSSES)
+    left = (np.asarray(colour) * (20 / 21) + 1 / 21) * (1 - wanted)
+    mean = left / (1 - lost + left * lost)
+    return np.maximum(0, (mean - 1 / 21) * (21 / 20))
+
+
+# Share of light that single scattering leaves of what passes a glass ball of index 1.5, by roughness in steps of 0.1:
+# rendered by Cycles 3.4 under an even sky, 7 % taken off as reflected.
+THROUGH = (1, 0.995, 0.977, 0.933, 0.854, 0.758, 0.635, 0.499, 0.373, 0.265, 0.176)
+
+
+def single_scattering_glass(roughness, ior):
+    """Factor of what passes two borders; the exponent fits a ball of index 1.2 to 0.03."""
+    index = max(ior, 1 / max(ior, 0.1))
+    return float(np.interp(roughness, np.linspace(0, 1, 11), THROUGH)) ** ((index - 1) / 0.5)
+
+
+@dataclasses.dataclass
+class ClearCoat:
+    share: float
+    roughness: float
+    ior: float
+
+    def leaves(self):
+        f0 = normal_reflectance(self.ior)
+        return dimming(self.share * f0, self.roughness ** 2, self.share * min(1, 50 * f0))
+
+
+@dataclasses.dataclass
+class ByPlace:
+    """A surface whose share of metal a picture gives."""
+    metallic: Value
+    base: Value  # of metal and diffuse part alike
+    f0: Value    # of the dielectric's share
 
 
 @dataclasses.dataclass
@@ -53,6 +100,9 @@ class Surface:
     emission: Value = ZERO
     opacity: Value = ONE
     clear: bool = False  # lets light pass, and does nothing else
+    rough_picture: Value = None  # `roughness` is its mean then
+    by_place: ByPlace = None
+    clearcoat: ClearCoat = None
 
 
 def luminance(value):
@@ -63,6 +113,7 @@ class SurfaceReader(Evaluator):
     """Closures of one material's tree, added up."""
 
     normals = None  # (picture, strength)
+    heights = None  # (picture, distance, strength)
 
     def surface(self, socket, stack=()):
         node, output, stack = self.source(socket, stack)
@@ -85,9 +136,30 @@ class SurfaceReader(Evaluator):
         if wa > 0 and wb > 0 and abs(a.roughness - b.roughness) > 0.05:
             self.note("", "Several glossy lobes in one material, taken as one")
         roughness = (wa * a.roughness + wb * b.roughness) / (wa + wb) if wa + wb > 0 else a.roughness
+        picture = a.rough_picture if wb <= 0 else b.rough_picture if wa <= 0 else None
+        if picture is None and (wa > 0 and a.rough_picture or wb > 0 and b.rough_picture):
+            self.note("roughness", "Textures taken as their mean")
+
+        def weight(h, s):
+            return h.scalar() * sum(luminance(getattr(s, slot)) for slot in ("diffuse", "metal", "glass", "coat"))
+
+        by_place = None
+        if a.by_place or b.by_place:
+            of, plain, other = (a, f, weight(g, b)) if a.by_place else (b, g, weight(f, a))
+            if other <= 0 and plain.picture is None and (plain.factor == 1).all():  # such as emission added
+                by_place = of.by_place
+            else:
+                self.note("metallic", "Textures taken as their mean")
+        coats = [(h.scalar(), s.clearcoat) for h, s in ((f, a), (g, b)) if s.clearcoat and h.scalar() > 0]
+        clearcoat = None
+        if coats:
+            whole = sum(h * c.share for h, c in coats)
+            clearcoat = ClearCoat(min(1.0, whole), sum(h * c.share * c.roughness for h, c in coats) / whole,
+                                  max(coats, key=lambda x: x[0] * x[1].share)[1].ior)
         summed = {slot: self.add(self.multiply(f, getattr(a, slot)), self.multiply(g, getattr(b, slot)))
                   for slot in ("diffuse", "metal", "glass", "coat", "emission", "opacity")}
-        return Surface(roughness=roughness, ior=a.ior if luminance(a.glass) > luminance(b.glass) else b.ior, **summed)
+        return Surface(roughness=roughness, ior=a.ior if luminance(a.glass) > luminance(b.glass) else b.ior,
+                       rough_picture=picture, by_place=by_place, clearcoat=clearcoat, **summed)
 
     def closure_mix_shader(self, node, stack):
         f = self.value(node.inputs[0], stack)
@@ -113,12 +185,30 @@ class SurfaceReader(Evaluator):
     # ---- Closures -----------------------------------------------------------------------------------------------
 
     def bumps(self, node, stack):
+        """What turns the node's normal: a normal map, a bump map, or a bump map above a normal map."""
         socket = node.inputs.get("Normal")
         if socket is None or not socket.is_linked:
             return
         source, _, stack = self.source(socket, stack)
         if source is None:
             return
+        if source.type == "BUMP":
+            self.bumps(source, stack)
+            socket = source.inputs["Height"]
+            if not socket.is_linked:
+                return
+            height = self.grey(self.value(socket, stack))
+            if height.picture is not None:
+                distance = self.number(source.inputs["Distance"], stack, "bump distance") * float(height.factor[0])
+                strength = self.number(source.inputs["Strength"], stack, "bump strength")
+                if distance == 0 or strength <= 0:
+                    return
+                found = height.picture, -distance if source.invert else distance, min(10.0, strength)
+                if self.heights is None:
+                    self.heights = found
+                elif self.heights[0].key != found[0].key or self.heights[1:] != found[1:]:
+                    self.note(found[0].name, "Several bump maps in one material, the first taken")
+                return
         if source.type == "NORMAL_MAP" and source.space == "TANGENT":
             colour = self.value(source.inputs["Color"], stack)
             strength = self.number(source.inputs["Strength"], stack, "normal strength")
@@ -130,8 +220,13 @@ class SurfaceReader(Evaluator):
                 return
         self.note(source.bl_label, "Normal and bump maps left out")
 
-    def roughness(self, node, stack):
-        return min(1.0, max(0.0, self.number(node.inputs.get("Roughness"), stack, "roughness")))
+    def rough(self, node, stack):
+        """Roughness, as one number and, where there is one, as the picture that it is the mean of."""
+        value = self.clipped(self.grey(self.value(node.inputs.get("Roughness"), stack)))
+        return {"roughness": value.scalar(), "rough_picture": value if value.picture is not None else None}
+
+    def gloss(self, node, stack):
+        return {"roughness": 0.0} if getattr(node, "distribution", "") == "SHARP" else self.rough(node, stack)
 
     def closure_bsdf_diffuse(self, node, stack):
         self.bumps(node, stack)
@@ -139,17 +234,26 @@ class SurfaceReader(Evaluator):
             self.note("", "Rough diffuse (Oren-Nayar) taken as Lambert")
         return Surface(diffuse=self.value(node.inputs["Color"], stack))
 
+    def metal(self, node, colour, gloss):
+        """The colour; darker where the node lets rough metal lose light. A picture of roughness counts by its mean."""
+        alpha = gloss["roughness"] ** 2
+        if getattr(node, "distribution", "MULTI_GGX") == "MULTI_GGX" or alpha < 0.02 or colour.is_zero():
+            return colour
+        self.note(node.bl_label, "Rough metal of single scattering darkened by its mean albedo")
+        return self.apply("single scattering", lambda c: single_scattering(c, alpha), colour)
+
     def closure_bsdf_glossy(self, node, stack):
         self.bumps(node, stack)
-        rough = 0.0 if getattr(node, "distribution", "") == "SHARP" else self.roughness(node, stack)
-        return Surface(metal=self.value(node.inputs["Color"], stack), roughness=rough)
+        gloss = self.gloss(node, stack)
+        return Surface(metal=self.metal(node, self.value(node.inputs["Color"], stack), gloss), **gloss)
 
     closure_bsdf_anisotropic = closure_bsdf_glossy
 
     def closure_bsdf_metallic(self, node, stack):
         self.bumps(node, stack)
         self.note("Metallic BSDF", "Shaders taken as metal of their base colour")
-        return Surface(metal=self.value(input_of(node, "Base Color", "Color"), stack), roughness=self.roughness(node, stack))
+        gloss = self.rough(node, stack)
+        return Surface(metal=self.metal(node, self.value(input_of(node, "Base Color", "Color"), stack), gloss), **gloss)
 
     def closure_emission(self, node, stack):
         colour, strength = self.value(node.inputs["Color"], stack), self.value(node.inputs["Strength"], stack)
@@ -169,13 +273,22 @@ class SurfaceReader(Evaluator):
     def note_glass(self, node):
         self.note(node.bl_label, "Glass: lamps do not shine straight through it, their light passes along light paths alone")
 
+    def loss(self, node, gloss, ior):
+        """Factor of what passes glass; darker where the node lets rough glass lose light."""
+        if getattr(node, "distribution", "") not in {"GGX", "BECKMANN"} or gloss["roughness"] < 0.15:
+            return ONE
+        self.note(node.bl_label, "Rough glass of single scattering darkened by its mean albedo")
+        return Value(single_scattering_glass(gloss["roughness"], ior))
+
     def closure_bsdf_glass(self, node, stack):
         self.bumps(node, stack)
         self.note_glass(node)
         colour = self.value(node.inputs["Color"], stack)
-        rough = 0.0 if getattr(node, "distribution", "") == "SHARP" else self.roughness(node, stack)
-        ior = self.number(node.inputs["IOR"], stack, "IOR")
-        return Surface(glass=self.multiply(colour, colour), roughness=rough, ior=ior)
+        ior, gloss = self.number(node.inputs["IOR"], stack, "IOR"), self.gloss(node, stack)
+        if (colour.mean() < 0.99).any():
+            self.note(node.bl_label, "Coloured glass: what it reflects keeps its colour here")
+        through = self.multiply(self.multiply(colour, colour), self.loss(node, gloss, ior))
+        return Surface(glass=through, ior=ior, **gloss)
 
     def closure_bsdf_refraction(self, node, stack):
         self.note(node.bl_label, "Shaders taken as glass, which reflects too")
@@ -191,8 +304,33 @@ class SurfaceReader(Evaluator):
 
     def closure_eevee_specular(self, node, stack):
         return Surface(diffuse=self.value(node.inputs["Base Color"], stack),
-                       coat=self.value(node.inputs["Specular"], stack), roughness=self.roughness(node, stack),
-                       emission=self.value(node.inputs["Emissive Color"], stack))
+                       coat=self.value(node.inputs["Specular"], stack),
+                       emission=self.value(node.inputs["Emissive Color"], stack), **self.rough(node, stack))
+
+    def clear_coat(self, node, stack):
+        """(coat or None, factor of the colours beneath)"""
+        share = min(1.0, max(0.0, self.number(input_of(node, "Clearcoat", "Coat Weight"), stack, "clearcoat")))
+        if share <= 0:
+            return None, ONE
+        rough = min(1.0, max(0.0, self.number(input_of(node, "Clearcoat Roughness", "Coat Roughness"), stack,
+                                              "clearcoat roughness")))
+        normal = input_of(node, "Clearcoat Normal", "Coat Normal")
+        if normal is not None and normal.is_linked:
+            self.note("clearcoat", "Normals of coats, taken as those of what is beneath")
+        if bpy.app.version < (4, 0, 0):
+            # A quarter of it, of the distribution GTR1, whose half vectors have their median at tan²θ = α where GGX's
+            # have it at α². It takes nothing from what is beneath.
+            coat = ClearCoat(0.25 * share, math.sqrt(rough), 1.5)
+            self.note("clearcoat", "Clearcoats (GTR1) as GGX of the same median width")
+            return coat, Value(1 / coat.leaves())
+        coat = ClearCoat(share, rough, min(10.0, max(1.0, self.number(node.inputs["Coat IOR"], stack, "coat IOR"))))
+        tint = np.clip(self.value(node.inputs.get("Coat Tint"), stack).mean(), 0, 1)
+        if (tint == 1).all():
+            return coat, ONE
+        self.note("coat tint", "Tints of coats, taken as of light from all sides")
+        square = coat.ior ** 2  # mean of 1/cosine beneath the border, over the projected solid angle above it
+        depth = 2 * square * (1 - math.sqrt(1 - 1 / square)) if square > 1 else 2.0
+        return coat, Value(1 - share + share * tint ** depth)
 
     def closure_bsdf_principled(self, node, stack):
         self.bumps(node, stack)
@@ -201,8 +339,7 @@ class SurfaceReader(Evaluator):
             socket = input_of(node, *names)
             return self.value(socket, stack) if socket is not None else ZERO
 
-        for names, text in ((("Clearcoat", "Coat Weight"), "clearcoat"), (("Sheen", "Sheen Weight"), "sheen"),
-                            (("Anisotropic",), "anisotropy"), (("Specular Tint",), "specular tint"),
+        for names, text in ((("Sheen", "Sheen Weight"), "sheen"), (("Anisotropic",), "anisotropy"), (("Specular Tint",), "specular tint"),
                             (("Thin Film Thickness",), "thin film")):
             socket = input_of(node, *names)
             if socket is None:
@@ -217,7 +354,10 @@ class SurfaceReader(Evaluator):
             self.note("subsurface", "Principled features taken as diffuse")
             if node.inputs.get("Subsurface Color") is not None:
                 base = self.mix(scattered, base, value("Subsurface Color"))
-        metallic, transmission = value("Metallic"), value("Transmission", "Transmission Weight")
+        metallic, transmission = self.clipped(self.grey(value("Metallic"))), value("Transmission", "Transmission Weight")
+        if metallic.picture is not None and not transmission.is_zero():
+            self.note("metallic", "Textures taken as their mean")
+            metallic = Value(metallic.mean())
         ior = self.number(node.inputs["IOR"], stack, "IOR")
         if node.inputs.get("Specular IOR Level") is not None:  # 4.x
             f0 = self.multiply(value("Specular IOR Level"), Value(2 * normal_reflectance(ior)))
@@ -225,7 +365,10 @@ class SurfaceReader(Evaluator):
             f0 = self.multiply(value("Specular"), Value(0.08))
         dielectric = self.complement(metallic)
         opaque = self.multiply(dielectric, self.complement(transmission))
-        rough = self.roughness(node, stack)
+        gloss = self.rough(node, stack)
+        rough = gloss["roughness"]
+        clearcoat, beneath = self.clear_coat(node, stack)
+        base, f0 = self.multiply(beneath, base), self.multiply(beneath, f0)
         if bpy.app.version < (4, 0, 0) and not base.is_zero() and not dielectric.is_zero():
             # Burley's diffuse, which Blender gave up with 4.0: 0.5 to 1.1 times Lambert by direction. Its albedo under
             # even light from all sides, integrated numerically, is linear in the roughness to 0.001.
@@ -234,7 +377,13 @@ class SurfaceReader(Evaluator):
             lambert = self.multiply(base, Value((0.953 + 0.1123 * rough) / dimming(f0.mean().max(), rough * rough)))
         else:
             lambert = base
-        glass = self.multiply(self.multiply(base, dielectric), transmission)
+        # Before 4.0 each border coloured by the base, since then by its root. A diffuse share needs the base itself.
+        pure = transmission.picture is None and (transmission.factor >= 0.99).all()
+        through = self.multiply(base, base) if pure and bpy.app.version < (4, 0, 0) else base
+        if not transmission.is_zero():
+            through = self.multiply(through, self.loss(node, gloss, ior))
+        glass = self.multiply(self.multiply(through, dielectric), transmission)
+        metal = base if metallic.is_zero() else self.metal(node, base, gloss)
         if not glass.is_zero():
             self.note_glass(node)
         rough_glass = node.inputs.get("Transmission Roughness")
@@ -242,13 +391,17 @@ class SurfaceReader(Evaluator):
             self.note("transmission roughness", "Principled features left out")
         emission = self.multiply(value("Emission", "Emission Color"), value("Emission Strength"))
         opacity = value("Alpha")
-        return Surface(diffuse=self.multiply(lambert, opaque), metal=self.multiply(base, metallic), glass=glass,
-                       coat=self.multiply(f0, opaque), roughness=rough, ior=ior, emission=emission, opacity=opacity)
+        by_place = None
+        if metallic.picture is not None:
+            by_place = ByPlace(metallic, base if lambert is metal else self.mix(metallic, lambert, metal), f0)
+        return Surface(diffuse=self.multiply(lambert, opaque), metal=self.multiply(metal, metallic), glass=glass,
+                       coat=self.multiply(f0, opaque), ior=ior, emission=emission, opacity=opacity, by_place=by_place,
+                       clearcoat=clearcoat, **gloss)
 
 
 @dataclasses.dataclass
 class Converted:
-    """A material with the pictures of its four slots and where they lie on a mesh."""
+    """A material with the pictures of its slots and where they lie on a mesh."""
     name: str
     values: library.Material
     pictures: dict
@@ -290,11 +443,15 @@ class Materials:
 
     def _convert(self, material):
         name = "default" if material is None else material.name
-        surface, normals = self._surface(material, name)
+        surface, normals, heights = self._surface(material, name)
         m = library.Material(opacity=1.0)
         pictures = {}
         factors = {}
         values = self._gloss(surface, name, m)
+        for slot in ("roughness", "metallic"):
+            if slot in values:
+                pictures[slot] = values[slot].picture
+                setattr(m, slot, float(values[slot].factor[0]))
         for slot in SLOTS:
             value = values.get(slot) or getattr(surface, slot)
             if value.picture is not None and value.is_zero():
@@ -315,8 +472,11 @@ class Materials:
         m.opacity = min(1.0, max(opacity, HOLE))
         if normals is not None:
             pictures["normal"], m.normal_strength = normals
+        if heights is not None:
+            pictures["height"], m.bump_distance, m.bump_strength = heights
         mappings = {p.mapping for p in pictures.values()}
-        mapping = next((pictures[slot].mapping for slot in SLOTS + ("normal",) if slot in pictures), Mapping())
+        every = SLOTS + ("roughness", "metallic", "normal", "height")
+        mapping = next((pictures[slot].mapping for slot in every if slot in pictures), Mapping())
         if len(mappings) > 1:
             self.report.note(name, "Textures of one material on several coordinates, all laid on the first's")
         for slot, picture in pictures.items():
@@ -326,13 +486,32 @@ class Materials:
         return Converted(name, m, pictures, mapping)
 
     def _gloss(self, surface, name, m):
-        """Values of the slots diffuse and specular; flags and numbers into `m`."""
+        """Values of the slots diffuse and specular, and of roughness and metallic where they are pictures; flags and
+        numbers into `m`."""
         d, metal, glass = luminance(surface.diffuse), luminance(surface.metal), luminance(surface.glass)
         coat, diffuse = surface.coat, surface.diffuse
-        if metal + glass + luminance(coat) <= 0:
+        if metal + glass + luminance(coat) <= 0 and surface.clearcoat is None:
             return {"diffuse": diffuse, "specular": ZERO}
         m.flags |= library.GGX
-        add = Evaluator(name, self.images, self.report).add
+        evaluator = Evaluator(name, self.images, self.report)
+        add = evaluator.add
+        if surface.clearcoat is not None:
+            c = surface.clearcoat
+            m.coat, m.coat_roughness, m.coat_ior = c.share, self._raised(c.roughness, name), c.ior
+        least = roughness_of(self.max_shininess)
+        pictured = {}
+        if surface.rough_picture is not None:
+            value = surface.rough_picture
+            texels = value.texels()
+            if ((MIRROR <= texels) & (texels < least)).any():
+                self._raised(MIRROR, name)
+                value = evaluator.apply("gloss limit", lambda r: np.where((MIRROR <= r) & (r < least), least, r), value)
+            pictured["roughness"] = value
+        m.roughness, m.ior = self._raised(surface.roughness, name), min(10.0, max(0.1, surface.ior))
+        if surface.by_place is not None:
+            pictured["metallic"] = surface.by_place.metallic
+            f0, glass = surface.by_place.f0, 0.0
+            return {**pictured, "diffuse": surface.by_place.base, "specular": self._specular(f0, glass, name, m)}
         parts = [value for value in (diffuse, surface.metal, surface.glass) if luminance(value) > 0]
         hues = [value.mean() / luminance(value) for value in parts]
         if len(parts) > 1 and any(abs(hue - hues[0]).max() > 0.05 for hue in hues):
@@ -351,21 +530,27 @@ class Materials:
         whole = d + metal + glass
         m.metallic = metal / whole if whole > 0 else 0.0
         m.transmission = glass / (d + glass) if d + glass > 0 else 0.0
-        m.roughness, m.ior = surface.roughness, min(10.0, max(0.1, surface.ior))
-        least = roughness_of(self.max_shininess)
-        if MIRROR <= m.roughness < least:
-            self.report.note(name, f"Roughness raised to the gloss limit (exponent {self.max_shininess:g})")
-            m.roughness = least
         opaque = (1 - m.metallic) * (1 - m.transmission)
         f0 = Value(coat.factor / opaque, coat.picture) if opaque > 1e-3 else ZERO
+        return {**pictured, "diffuse": base, "specular": self._specular(f0, glass, name, m)}
+
+    def _raised(self, roughness, name):
+        least = roughness_of(self.max_shininess)
+        if not MIRROR <= roughness < least:
+            return roughness
+        self.report.note(name, f"Roughness raised to the gloss limit (exponent {self.max_shininess:g})")
+        return least
+
+    def _specular(self, f0, glass, name, m):
+        """Of a dielectric share with that reflectance straight on; may change the index in `m`."""
         most = float(f0.factor.max())
         if most <= 0:
-            return {"diffuse": base, "specular": ZERO}
+            return ZERO
         if most > 0.66:
             self.report.note(name, "Coats that reflect more than 66 % straight on, cut to that")
         if glass <= 0 or normal_reflectance(m.ior) < most:
             m.ior = ior_of(most)
-        return {"diffuse": base, "specular": Value(np.minimum(1, f0.factor / normal_reflectance(m.ior)), f0.picture)}
+        return Value(np.minimum(1, f0.factor / normal_reflectance(m.ior)), f0.picture)
 
     @staticmethod
     def _mask(picture):
@@ -378,16 +563,17 @@ class Materials:
 
     def _surface(self, material, name):
         if material is None:
-            return Surface(diffuse=Value(0.8)), None
+            return Surface(diffuse=Value(0.8)), None, None
         if not material.use_nodes or material.node_tree is None:
-            return Surface(diffuse=Value(list(material.diffuse_color)[:3])), None
+            return Surface(diffuse=Value(list(material.diffuse_color)[:3])), None, None
         reader = SurfaceReader(name, self.images, self.report)
         tree = material.node_tree
         output = tree.get_output_node("CYCLES") or tree.get_output_node("ALL")
         if output is None:
-            return Surface(), None
+            return Surface(), None, None
         for socket in ("Volume", "Displacement"):
             if output.inputs[socket].is_linked:
                 reader.note("", f"{socket}s left out" if socket == "Volume" else "Displacement left out")
         # Outputs inside a group cannot be: the output stands in the tree itself.
-        return reader.surface(output.inputs["Surface"]), reader.normals
+        surface = reader.surface(output.inputs["Surface"])
+        return surface, reader.normals, reader.heights

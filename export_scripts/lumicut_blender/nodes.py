@@ -48,6 +48,13 @@ class Picture:
             return np.ascontiguousarray(pixels), self.flags | (library.SRGB if srgb else 0)
         return np.ascontiguousarray(self._linear, np.float32), self.flags
 
+    def is_byte(self):
+        return self._stored is not None and self._stored()[0].dtype == np.uint8
+
+    def is_grey(self):
+        texels = self._stored()[0] if self._stored is not None else self._linear
+        return texels.shape[2] == 1 or (texels[..., :1] == texels[..., 1:3]).all()
+
     def linear(self):
         if self._linear is None:
             pixels, srgb = self._stored()
@@ -312,6 +319,20 @@ class Evaluator:
         if b.is_zero():
             return a
         return self.apply("sum", lambda x, y: x + y, a, b)
+
+    def grey(self, a):
+        """As colours become numbers: by their luminance."""
+        if a.picture is None:
+            return Value(float(a.factor @ LUMINANCE))
+        if (a.factor == a.factor[0]).all() and a.picture.is_grey():
+            return a
+        return self.apply("grey", lambda c: np.repeat((c @ LUMINANCE)[..., None], 3, -1), a)
+
+    def clipped(self, a):
+        """Within 0..1, with a factor that is."""
+        if a.picture is not None and 0 <= a.factor.min() and a.factor.max() <= 1 and a.picture.is_byte():
+            return a
+        return self.apply("clip", lambda x: np.clip(x, 0, 1), a)
 
     def complement(self, a):
         return self.apply("complement", lambda x: 1 - x, a)

@@ -209,6 +209,7 @@ class MaterialTrees(unittest.TestCase):
     def principled(self, **inputs):
         m = h.material("Stuff")
         node = h.shader(m, "ShaderNodeBsdfPrincipled")
+        node.distribution = "MULTI_GGX"  # as the library has it
         for name, value in inputs.items():
             socket = next(s for s in (node.inputs.get(n) for n in name.split("|")) if s is not None)
             socket.default_value = value
@@ -258,6 +259,106 @@ class MaterialTrees(unittest.TestCase):
         self.assertEqual(data.images[0].flags & library.SRGB, 0)
         self.assertFalse(any("Normal" in n for n in notes), notes)
 
+    def linked(self, m, node, socket, image=None):
+        texture = m.node_tree.nodes.new("ShaderNodeTexImage")
+        texture.image = image or self.image(srgb=False)
+        m.node_tree.links.new(texture.outputs["Color"], node.inputs[socket])
+        return texture
+
+    def test_images_of_roughness_and_metallic_are_grey_textures(self):
+        m, node = self.principled()
+        self.linked(m, node, "Roughness")
+        grey = self.image("grey", (0.5, 0.5, 0.5, 1), srgb=False)
+        self.linked(m, node, "Metallic", grey)
+        out, notes, data = the_material(m)
+        self.assertEqual((out.roughness, out.metallic), (1, 1))
+        rough, metal = (data.images[n - 1].pixels for n in (out.roughness_texture, out.metallic_texture))
+        expected = np.array((128, 64, 255)) / 255 @ (0.2126, 0.7152, 0.0722)  # a colour's luminance is its number
+        np.testing.assert_allclose(rough[0, 0], expected, atol=1e-3)
+        self.assertEqual(list(metal[0, 0][:3]), [128] * 3)  # as it is: bytes
+        self.assertFalse(any("their mean" in n for n in notes), notes)
+
+    def test_a_factor_and_the_gloss_limit_work_on_a_texture_of_roughness(self):
+        m, node = self.principled()
+        texture = self.linked(m, node, "Roughness", self.image("grey", (0.24, 0.24, 0.24, 1), srgb=False))
+        half = m.node_tree.nodes.new("ShaderNodeMath")
+        half.operation = "MULTIPLY"
+        half.inputs[1].default_value = 0.5
+        m.node_tree.links.new(texture.outputs["Color"], half.inputs[0])
+        m.node_tree.links.new(half.outputs[0], node.inputs["Roughness"])
+        out, notes, data = the_material(m, 300.0)
+        texels = data.images[out.roughness_texture - 1].pixels * out.roughness
+        self.assertAlmostEqual(float(texels.max()), materials.roughness_of(300), places=5)
+        self.assertEqual(float(texels.min()), 0.0)  # the mirror's part stays one
+        self.assertTrue(any("gloss limit" in n for n in notes), notes)
+
+    def test_a_mask_between_metal_and_paint(self):
+        """Burley's factor is on the paint's half alone; emission added keeps it by place, other shaders do not."""
+        for add in (None, "ShaderNodeEmission", "ShaderNodeBsdfDiffuse"):
+            with self.subTest(add=add):
+                h.new_scene()
+                m, node = self.principled(**{"Base Color": (0.4, 0.4, 0.4, 1)})
+                self.linked(m, node, "Metallic", self.image("mask", (1, 1, 1, 1), srgb=False))
+                if add:
+                    sum_ = h.shader(m, "ShaderNodeAddShader")
+                    m.node_tree.links.new(node.outputs[0], sum_.inputs[0])
+                    m.node_tree.links.new(m.node_tree.nodes.new(add).outputs[0], sum_.inputs[1])
+                out, notes, data = the_material(m)
+                if add == "ShaderNodeBsdfDiffuse":
+                    self.assertEqual(out.metallic_texture, 0)
+                    self.assertTrue(any("metallic" in n for n in notes), notes)
+                    continue
+                self.assertGreater(out.metallic_texture, 0)
+                self.assertAlmostEqual(sum(out.specular) / 3 * materials.normal_reflectance(out.ior), 0.04, delta=0.006)
+
+    def test_bump_maps(self):
+        m, node = self.principled()
+        bump, mapped = (m.node_tree.nodes.new(k) for k in ("ShaderNodeBump", "ShaderNodeNormalMap"))
+        bump.inputs["Distance"].default_value, bump.inputs["Strength"].default_value, bump.invert = 0.2, 0.7, True
+        self.linked(m, bump, "Height", self.image("heights", (0.5, 0.5, 0.5, 1), srgb=False))
+        self.linked(m, mapped, "Color", self.image("normals", (0.5, 0.5, 1, 1), srgb=False))
+        m.node_tree.links.new(mapped.outputs[0], bump.inputs["Normal"])
+        m.node_tree.links.new(bump.outputs[0], node.inputs["Normal"])
+        out, notes, _ = the_material(m)
+        self.assertNotEqual(out.height_texture, out.normal_texture)
+        self.assertGreater(min(out.height_texture, out.normal_texture), 0)
+        np.testing.assert_allclose((out.bump_distance, out.bump_strength), (-0.2, 0.7), rtol=1e-6)
+        self.assertFalse(any("bump" in n.lower() for n in notes), notes)
+
+    def test_bumps_of_what_is_no_image_are_reported_by_name(self):
+        m, node = self.principled()
+        bump = m.node_tree.nodes.new("ShaderNodeBump")
+        m.node_tree.links.new(m.node_tree.nodes.new("ShaderNodeTexNoise").outputs[0], bump.inputs["Height"])
+        m.node_tree.links.new(bump.outputs[0], node.inputs["Normal"])
+        out, notes, _ = the_material(m)
+        self.assertEqual(out.height_texture, 0)
+        self.assertTrue(any("bump maps left out" in n and "Stuff" in n for n in notes), notes)
+
+    def test_clear_coats(self):
+        m, node = self.principled(**{"Clearcoat|Coat Weight": 0.8, "Clearcoat Roughness|Coat Roughness": 0.09})
+        out, notes, _ = the_material(m)
+        if bpy.app.version < (4, 0, 0):  # a quarter, and a longer tailed distribution
+            np.testing.assert_allclose((out.coat, out.coat_roughness, out.coat_ior), (0.2, 0.3, 1.5), rtol=1e-5)
+            self.assertTrue(any("GTR1" in n for n in notes), notes)
+        else:
+            np.testing.assert_allclose((out.coat, out.coat_roughness, out.coat_ior), (0.8, 0.09, 1.5), rtol=1e-5)
+            h.new_scene()
+            m, node = self.principled(**{"Coat Weight": 1.0, "Base Color": (0.5, 0.5, 0.5, 1)})
+            node.inputs["Coat Tint"].default_value = (1, 0.5, 0.5, 1)
+            tinted = the_material(m)[0].diffuse
+            self.assertAlmostEqual(tinted[0], 0.5, places=3)
+            self.assertAlmostEqual(tinted[1], 0.5 * 0.5 ** 1.146, places=2)
+
+    def test_rough_metal_of_single_scattering_is_darker(self):
+        colours = {}
+        for kind in ("GGX", "MULTI_GGX"):
+            h.new_scene()
+            m, node = self.principled(**{"Base Color": (0.9, 0.6, 0.3, 1), "Metallic": 1.0, "Roughness": 0.8})
+            node.distribution = kind
+            colours[kind] = np.array(the_material(m)[0].diffuse)
+        np.testing.assert_allclose(colours["MULTI_GGX"], (0.9, 0.6, 0.3), rtol=1e-6)
+        self.assertTrue((colours["GGX"] < 0.9 * colours["MULTI_GGX"]).all(), colours)
+
     def test_mirrors_stay_mirrors(self):
         m, _ = self.principled(**{"Roughness": 0.0, "Metallic": 1.0})
         out, _, _ = the_material(m)
@@ -305,7 +406,7 @@ class MaterialTrees(unittest.TestCase):
         mix.inputs[0].default_value = 0.25
         a, b = m.node_tree.nodes.new("ShaderNodeBsdfDiffuse"), m.node_tree.nodes.new("ShaderNodeBsdfGlossy")
         a.inputs["Color"].default_value, b.inputs["Color"].default_value = (0.8, 0.4, 0, 1), (1, 1, 1, 1)
-        b.inputs["Roughness"].default_value = 0.4
+        b.inputs["Roughness"].default_value, b.distribution = 0.4, "MULTI_GGX"
         m.node_tree.links.new(a.outputs[0], mix.inputs[1])
         m.node_tree.links.new(b.outputs[0], mix.inputs[2])
         out, _, _ = the_material(m)
@@ -519,15 +620,16 @@ class MaterialTrees(unittest.TestCase):
         m, node = self.principled()
         noise, bump = m.node_tree.nodes.new("ShaderNodeTexNoise"), m.node_tree.nodes.new("ShaderNodeBump")
         m.node_tree.links.new(noise.outputs["Color"], node.inputs["Base Color"])
+        m.node_tree.links.new(noise.outputs[0], bump.inputs["Height"])
         m.node_tree.links.new(bump.outputs[0], node.inputs["Normal"])
-        coat = node.inputs.get("Clearcoat") or node.inputs.get("Coat Weight")
-        coat.default_value = 0.5
+        sheen = node.inputs.get("Sheen") or node.inputs.get("Sheen Weight")
+        sheen.default_value = 0.5
         glass = h.material("Pane")
         h.shader(glass, "ShaderNodeBsdfGlass")
         h.add_plane(material=glass, name="Window")
         out, notes, _ = the_material(m)
         text = "\n".join(notes)
-        for words in ("Noise Texture", "Normal and bump maps left out: Stuff", "clearcoat", "Pane", "Glass"):
+        for words in ("Noise Texture", "Normal and bump maps left out: Stuff", "sheen", "Pane", "Glass"):
             self.assertIn(words, text)
         self.assertEqual(len(notes), len(set(notes)), "each once")
 

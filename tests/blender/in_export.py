@@ -46,6 +46,23 @@ def textured(name, image, alpha=False, nearest=False, clamp=False):
     return m
 
 
+def worn(name, wear, heights):
+    """Of textured roughness and metal, bumps and a clear coat."""
+    m = h.material(name)
+    node = h.shader(m, "ShaderNodeBsdfPrincipled")
+    node.inputs[next(k for k in ("Clearcoat", "Coat Weight") if k in node.inputs)].default_value = 0.7
+    node.inputs[next(k for k in ("Clearcoat Roughness", "Coat Roughness") if k in node.inputs)].default_value = 0.3
+    bump = m.node_tree.nodes.new("ShaderNodeBump")
+    bump.inputs["Distance"].default_value = 0.05
+    m.node_tree.links.new(bump.outputs[0], node.inputs["Normal"])
+    for image, inputs in ((wear, (node.inputs["Roughness"], node.inputs["Metallic"])), (heights, (bump.inputs["Height"],))):
+        texture = m.node_tree.nodes.new("ShaderNodeTexImage")
+        texture.image = image
+        for socket in inputs:
+            m.node_tree.links.new(texture.outputs["Color"], socket)
+    return m
+
+
 def rich_scene():
     """Everything that a scene file can carry."""
     scene = h.new_scene(80, 60)
@@ -56,6 +73,9 @@ def rich_scene():
     board = h.add_plane(1.5, 0, textured("Board", picture("board", 8, 8, alpha=True), True, True, True), "Board")
     board.data.uv_layers.new(name="Map").data.foreach_set("uv", [-0.1, 0, 1.1, 0, 1.1, 1, -0.1, 1])
     board.location, board.rotation_euler = (-1.2, 0.5, 0.8), (math.radians(80), 0, 0.3)
+    plate = h.add_plane(0.8, 0, worn("Plate", picture("wear", 16, 16, floats=True), picture("heights", 16, 16)), "Plate")
+    plate.data.uv_layers.new(name="Map").data.foreach_set("uv", [0, 0, 1, 0, 1, 1, 0, 1])
+    plate.location, plate.rotation_euler = (0.2, -1.4, 0.5), (math.radians(50), 0, -0.2)
     ball = h.add_sphere(0.4, (0.8, 0, 0.4), h.diffuse((0.7, 0.2, 0.1), "red"), 16)
     ball.data.polygons.foreach_set("use_smooth", [p.index % 3 > 0 for p in ball.data.polygons])
     for i in range(3):

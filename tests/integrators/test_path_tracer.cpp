@@ -115,13 +115,14 @@ TEST(PathTracer, AnEmissiveMeshGivesWhatARectangleLampGives) {
   for (size_t i = 8; i < 16; ++i) EXPECT_NEAR(ra[i] / rb[i], 1.0, 0.03) << i;  // about 1 % of noise each
 }
 
-// A mirror on one wall, a rough metal block, a glass block: light by way of all of them.
+// A mirror on one wall, a rough metal block under a rough clear coat, a glass block: light by way of all of them.
 std::unique_ptr<Scene> shiny_room() {
   auto scene = std::make_unique<Scene>(Scene::Config{"embree", true});
   Material mirror, metal, glass;
   mirror.lobe = metal.lobe = glass.lobe = LobeModel::ggx;
   mirror.diffuse = {0.9f, 0.9f, 0.9f}, mirror.metallic = 1.0f, mirror.roughness = 0.0f;
   metal.diffuse = {0.8f, 0.6f, 0.3f}, metal.metallic = 1.0f, metal.roughness = 0.5f;
+  metal.coat = 1.0f, metal.coat_roughness = 0.4f, metal.coat_ior = 1.8f;
   glass.diffuse = {0.9f, 1.0f, 0.9f}, glass.transmission = 1.0f, glass.roughness = 0.0f, glass.ior = 1.5f;
   scene->set_materials({test::diffuse(0.6f, 0.6f, 0.6f), mirror, metal, glass});
   Mesh mesh;

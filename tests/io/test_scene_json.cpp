@@ -232,6 +232,43 @@ TEST(SceneJson, GgxHasItsOwnParameters) {
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"shininess", 5}}), {"shininess", "not of the model \"ggx\""});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"roughness", 1.5}}), {"roughness", "1.5"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"ior", 0}}), {"ior", "0"});
+  expect_in(wrong({{"name", "a"}, {"coat", 0.5}}), {"coat", "\"ggx\" alone"});
+  expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"coat", 2}}), {"coat", "2"});
+  expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"coat_ior", 0.9}}), {"coat_ior", "0.9"});
+  expect_in(wrong({{"name", "a"}, {"roughness_texture", "a.exr"}}), {"roughness_texture", "\"ggx\" alone"});
+  expect_in(wrong({{"name", "a"}, {"bump_distance", 0}}), {"bump_distance", "0"});
+}
+
+TEST(SceneJson, CoatsBumpsAndTexturesOfNumbersAreRead) {
+  const TemporaryFolder folder;
+  Image image;
+  image.width = 2, image.height = 1;
+  image.layers = {{"radiance", 3, {0.25f, 0.25f, 0.25f, 0.75f, 0.75f, 0.75f}}};
+  write_exr(folder / "a.exr", image, false);
+  json scene = json::parse(kScene);
+  scene["unit_scale"] = 0.01;
+  scene["materials"] = {{{"name", "grey"},
+                         {"model", "ggx"},
+                         {"coat", 0.8},
+                         {"coat_roughness", 0.2},
+                         {"coat_ior", 1.6},
+                         {"roughness_texture", "a.exr"},
+                         {"metallic_texture", {{"file", "a.exr"}, {"nearest", true}}},
+                         {"height_texture", "a.exr"},
+                         {"bump_distance", -2},
+                         {"bump_strength", 0.5}},
+                        {{"name", "dent"}, {"height_texture", "a.exr"}}};
+  const SceneData data = read_scene(folder.write("scene.json", scene.dump()));
+  const lumicut_material &m = data.materials[0].values, &dent = data.materials[1].values;
+  EXPECT_EQ(m.coat, 0.8f);
+  EXPECT_EQ(m.coat_roughness, 0.2f);
+  EXPECT_EQ(m.coat_ior, 1.6f);
+  EXPECT_EQ(m.roughness_texture, m.height_texture) << "read once";
+  EXPECT_NE(m.roughness_texture, m.metallic_texture);
+  EXPECT_FLOAT_EQ(m.bump_distance, -0.02f) << "a length: in the file's unit";
+  EXPECT_EQ(m.bump_strength, 0.5f);
+  EXPECT_FLOAT_EQ(dent.bump_distance, 0.01f) << "one unit of the file unless given";
+  EXPECT_EQ(data.textures[static_cast<size_t>(m.height_texture) - 1].flags & LUMICUT_SRGB, 0u);
 }
 
 TEST(SceneJson, MaterialsOfAnObjCanBeChangedByName) {

@@ -178,12 +178,33 @@ TEST(Abi, DescriptorsOfAnySizeAreReadByTheGrowthRule) {
   }
   {
     using T = lumicut_material;
-    check_input(
-        "lumicut_material", bytes_of(materials()[3]),
-        {F(T, struct_size), F(T, flags), F(T, diffuse), F(T, shininess), F(T, specular), F(T, opacity), F(T, emission),
-         F(T, diffuse_texture), F(T, specular_texture), F(T, opacity_texture), F(T, emission_texture), F(T, roughness),
-         F(T, metallic), F(T, ior), F(T, transmission), F(T, normal_texture), F(T, normal_strength)},
-        [&](const void* p) { return lumicut_scene_set_materials(s.get(), static_cast<const T*>(p), 1); });
+    check_input("lumicut_material", bytes_of(materials()[3]),
+                {F(T, struct_size),
+                 F(T, flags),
+                 F(T, diffuse),
+                 F(T, shininess),
+                 F(T, specular),
+                 F(T, opacity),
+                 F(T, emission),
+                 F(T, diffuse_texture),
+                 F(T, specular_texture),
+                 F(T, opacity_texture),
+                 F(T, emission_texture),
+                 F(T, roughness),
+                 F(T, metallic),
+                 F(T, ior),
+                 F(T, transmission),
+                 F(T, normal_texture),
+                 F(T, normal_strength),
+                 F(T, height_texture),
+                 F(T, bump_distance),
+                 F(T, bump_strength),
+                 F(T, roughness_texture),
+                 F(T, metallic_texture),
+                 F(T, coat),
+                 F(T, coat_roughness),
+                 F(T, coat_ior)},
+                [&](const void* p) { return lumicut_scene_set_materials(s.get(), static_cast<const T*>(p), 1); });
   }
   {
     using T = lumicut_mesh;

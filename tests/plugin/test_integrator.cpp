@@ -355,6 +355,74 @@ TEST(Shade, ManyThreadsAtOnceGetWhatOneGets) {
   }
 }
 
+// A rough clear coat is a point of its own within the library: hosts get one radiance a point all the same.
+TEST(Shade, ACoatAddsItsLobeToItsPointAndFramesShowTheSame) {
+  const api::Device device(2);
+  const auto floor = [&](float coat) {
+    api::Scene s(device);
+    auto m = make<lumicut_material>();
+    m.flags = LUMICUT_GGX;
+    m.diffuse[0] = m.diffuse[1] = m.diffuse[2] = 0.3f, m.roughness = 0.8f;
+    auto plain = m;
+    m.coat = coat, m.coat_roughness = 0.15f, m.coat_ior = 1.8f;
+    s.set_materials({m, plain});
+    Geometry g;
+    g.quad({{{-1, -1, 0}, {0, -1, 0}, {0, 1, 0}, {-1, 1, 0}}}, 0);
+    g.quad({{{0, -1, 0}, {1, -1, 0}, {1, 1, 0}, {0, 1, 0}}}, 1);
+    s.add_mesh(g.mesh());
+    auto l = make<lumicut_light>();
+    l.type = LUMICUT_POINT, l.value = 3;
+    l.color[0] = l.color[1] = l.color[2] = 1.0f;
+    l.position[2] = 2;
+    s.set_lights({l});
+    auto c = make<lumicut_camera>();
+    c.to_world[0] = c.to_world[5] = c.to_world[10] = 1, c.to_world[11] = 2;
+    c.orthographic = 1, c.height = 2;
+    s.set_camera(c);
+    s.commit();
+    return s;
+  };
+  constexpr uint32_t kSide = 8;
+  std::vector<lumicut_point> points;
+  for (uint32_t i = 0; i < kSide * kSide; ++i) {
+    auto p = lumicut_point{};
+    const auto at = [](uint32_t k) { return (static_cast<float>(k) + 0.5f) * (2.0f / kSide) - 1.0f; };
+    p.position[0] = at(i % kSide), p.position[1] = -at(i / kSide);
+    p.normal[2] = p.geometric_normal[2] = p.to_viewer[2] = 1;
+    p.material = p.position[0] < 0 ? 0 : 1;
+    p.pixel = i;
+    points.push_back(p);
+  }
+  const auto shaded = [&](float coat, const char* id) {
+    const api::Scene s = floor(coat);
+    api::Integrator i = integrator(device, 50, id);
+    i.prepare(s);
+    const auto radiance = i.shade(points);
+    auto f = frame(kSide, kSide);
+    f.flags = LUMICUT_ILLUMINANCE;
+    const api::Render r(i, s, f);
+    r.wait();
+    const auto image = r.read("radiance");
+    for (size_t k = 0; k < radiance.size(); ++k) EXPECT_NEAR(image[k], radiance[k], 1e-3f * radiance[k]) << id;
+    return std::pair(radiance, r.read("illuminance"));
+  };
+  for (const char* id : {"exhaustive", "lightcuts", "illumination_cut"}) {
+    SCOPED_TRACE(id);
+    const auto [with, lux_with] = shaded(1.0f, id);
+    const auto [without, lux_without] = shaded(0.0f, id);
+    for (size_t k = 0; k < points.size(); ++k) {
+      if (points[k].material == 1) {
+        EXPECT_EQ(with[3 * k], without[3 * k]) << "its neighbour has no coat";
+      }
+      EXPECT_NEAR(lux_with[k], lux_without[k], 1e-4f * lux_without[k]) << "light that arrives, not the lobes";
+    }
+    // The pixel nearest to the mirror image of the lamp, and one far from it.
+    const size_t near = 3 * (3 * kSide + 3), far = 0;
+    EXPECT_GT(with[near], 1.2f * without[near]);
+    EXPECT_LT(with[far], without[far]) << "what the coat reflects elsewhere is missing here";
+  }
+}
+
 TEST(Shade, RefusesPointsThatCannotBe) {
   const api::Device device(2);
   const api::Scene s = scene(device);

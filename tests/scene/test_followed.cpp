@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "scene/bsdf.h"
 #include "scene/followed.h"
 #include "tests/support/test_scenes.h"
 
@@ -118,21 +119,70 @@ TEST(Followed, TwoBordersColourLikeTheBase) {
   EXPECT_NEAR(f->weight.y / f->weight.z, 0.9f, 1e-5f);
 }
 
-TEST(Followed, RoughGlassAndMirrorsLoseLittleAndGainNothing) {
-  for (const float roughness : {0.05f, 0.09f, 0.3f, 0.5f})
-    for (const float cosine : {0.1f, 0.4f, 0.7f, 1.0f})
-      for (const float sign : {1.0f, -1.0f}) {
-        const auto [r, t] = energy(glass(roughness), at(cosine) * sign);
-        EXPECT_LE(r + t, 1.001);
-        if (cosine > 0.3f) {
-          EXPECT_GE(r + t, roughness < 0.4f ? 0.95 : 0.8) << roughness << " " << cosine;
+// 20,000 samples leave 0.3 % of noise; the table, of 400 directions each, is good to 1.5 %, edge-on 2 %.
+TEST(Followed, RoughGlassGivesBackWhatSingleScatteringLoses) {
+  for (const float ior : {1.2f, 2.0f})
+    for (const float roughness : {0.05f, 0.1f, 0.3f, 0.5f, 0.75f, 1.0f})
+      for (const float cosine : {0.1f, 0.4f, 1.0f})
+        for (const float sign : {1.0f, -1.0f}) {
+          const auto [r, t] = energy(glass(roughness, ior), at(cosine) * sign);
+          EXPECT_NEAR(r + t, 1.0, cosine <= 0.1f ? 0.025 : 0.02)
+              << "ior " << ior << " roughness " << roughness << " cosine " << cosine * sign;
         }
-      }
+}
+
+TEST(Followed, GlassOfANewIndexHasAnAlbedoOfItsOwn) {
+  OneSurface surface(glass(0.8f, 1.3f));
+  const float before = surface.scene.glass_albedo(0, false, 0.64f, 0.5f);
+  surface.scene.set_materials({glass(0.8f, 2.0f)});
+  EXPECT_EQ(surface.scene.glass_albedo(0, false, 0.64f, 0.5f), GlassAlbedo(2.0f).at(false, 0.64f, 0.5f));
+  EXPECT_NE(surface.scene.glass_albedo(0, false, 0.64f, 0.5f), before);
+}
+
+TEST(Followed, SharpMirrorsLoseNothing) {
   Material m = ggx({1, 1, 1}, 0.09f);
   m.metallic = 1;
   const auto [r, t] = energy(m, at(0.5f));
   EXPECT_NEAR(r, 1.0, 0.01);
   EXPECT_EQ(t, 0.0);
+}
+
+// Clear coats above mirrors, glass and what lights shade: all that leaves is followed or shaded, and is at most all.
+TEST(Followed, ASmoothClearCoatAndWhatIsBeneathTogetherKeepTheLight) {
+  for (const float coat : {0.25f, 1.0f})
+    for (const float coat_roughness : {0.0f, 0.08f})
+      for (const float cosine : {0.1f, 0.3f, 0.6f, 1.0f}) {
+        Material mirror = ggx({1, 1, 1}, 0.0f), clear = glass(0.4f), paint = ggx({1, 1, 1}, 0.6f);
+        mirror.metallic = 1;
+        for (Material m : {mirror, clear, paint}) {
+          m.coat = coat, m.coat_roughness = coat_roughness;
+          const auto [r, t] = energy(m, at(cosine));
+          const OneSurface surface(m);
+          const SurfacePoint p = surface.scene.shade_point(surface.hit, at(cosine), 0);
+          double shaded = p.diffuse.x * std::numbers::pi_v<float> * mean_of_fading(p.fade);
+          if (max_component(p.specular) > 0.0f) {
+            Rng rng(4, Stage::test);
+            SurfacePoint lobe = p;
+            lobe.diffuse = {};
+            constexpr int kSamples = 20000;
+            for (int i = 0; i < kSamples; ++i) {
+              const float u = rng.next_float(), v = rng.next_float();
+              shaded += Bsdf(lobe).sample(0.5f, u, v).weight.x / kSamples;
+            }
+          }
+          EXPECT_LE(r + t + shaded, 1.02) << coat << " " << cosine;
+          EXPECT_GE(r + t + shaded, cosine < 0.2f ? 0.75 : 0.88) << coat << " " << cosine;
+        }
+      }
+}
+
+TEST(Followed, ASmoothClearCoatReflectsFresnelsShareOverARoughBase) {
+  Material m = ggx({0.5f, 0.5f, 0.5f}, 0.6f);
+  m.coat = 1, m.coat_ior = 1.5f;
+  EXPECT_NEAR(energy(m, at(1.0f)).first, 0.04, 1e-4);
+  EXPECT_NEAR(energy(m, at(0.2f)).first, 0.04 + 0.96 * std::pow(0.8, 5), 1e-3);
+  m.coat = 0.5f;
+  EXPECT_NEAR(energy(m, at(1.0f)).first, 0.02, 1e-4);
 }
 
 TEST(Followed, ASmoothCoatAndItsBaseTogetherKeepTheLight) {

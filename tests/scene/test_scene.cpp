@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "core/error.h"
+#include "scene/followed.h"
 #include "tests/support/test_scenes.h"
 
 namespace lumicut {
@@ -204,6 +205,92 @@ TEST(Scene, NormalMapsTurnTheShadingNormalAlongUAndV) {
     for (int k = 0; k < 3; ++k) EXPECT_NEAR(hit.normal[k], expected[k], 1e-5f) << turned;
     EXPECT_EQ(hit.geometric_normal, (Vec3f{0, 0, 1}));
   }
+}
+
+namespace {
+// One square of texture coordinates 0 to 1 in the plane z = 0, `size` wide, of a material whose textures are
+// `textures`.
+std::unique_ptr<Scene> square(const Material& material, std::vector<Texture> textures, float size = 1.0f,
+                              bool flat_uvs = false) {
+  auto scene = std::make_unique<Scene>(Scene::Config{});
+  scene->set_textures(std::move(textures));
+  scene->set_materials({material});
+  Mesh mesh;
+  test::add_quad(mesh, {0, 0, 0}, {size, 0, 0}, {size, size, 0}, {0, size, 0}, 0);
+  if (!flat_uvs) mesh.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  if (flat_uvs) mesh.uvs = {{0.5f, 0.5f}, {0.5f, 0.5f}, {0.5f, 0.5f}, {0.5f, 0.5f}};
+  scene->add_mesh(mesh);
+  Progress progress;
+  scene->commit(progress);
+  return scene;
+}
+
+SurfaceHit above(const Scene& scene, float x, float y) {
+  std::vector<RayHit> rays(1);
+  rays[0].ray.org = {x, y, 1}, rays[0].ray.dir = {0, 0, -1};
+  scene.accel().intersect(rays);
+  return scene.surface(rays[0]);
+}
+
+Texture grey(uint32_t width, uint32_t height, const std::vector<float>& values) {
+  return {width, height, 1, Texture::Format::float32, {false, true, false}, values.data()};
+}
+}  // namespace
+
+TEST(Scene, BumpsTiltTheNormalByTheSlopeOfTheHeight) {
+  // Height u over the middle of the texture: rises by `distance` in `size`.
+  std::vector<float> ramp;
+  for (int i = 0; i < 64; ++i) ramp.push_back((static_cast<float>(i % 8) + 0.5f) / 8);
+  for (const float size : {1.0f, 2.0f})
+    for (const float distance : {0.5f, -0.25f})
+      for (const float strength : {1.0f, 0.5f, 2.0f}) {
+        Material m = test::diffuse(0.5f, 0.5f, 0.5f);
+        m.height_texture = 0, m.bump_distance = distance, m.bump_strength = strength;
+        const auto scene = square(m, {grey(8, 8, ramp)}, size);
+        const SurfaceHit hit = above(*scene, 0.4f * size, 0.45f * size);
+        const Vec3f turned = normalize(Vec3f{-distance / size, 0, 1}), flat{0, 0, 1};
+        const Vec3f expected = normalize(flat + (turned - flat) * strength);
+        for (int k = 0; k < 3; ++k) EXPECT_NEAR(hit.normal[k], expected[k], 1e-4f) << size << " " << distance;
+        EXPECT_EQ(hit.geometric_normal, flat);
+      }
+}
+
+TEST(Scene, BumpsLieOnTopOfNormalMapsAndNeedTextureCoordinates) {
+  std::vector<float> ramp;
+  for (int i = 0; i < 64; ++i) ramp.push_back((static_cast<float>(i % 8) + 0.5f) / 8);
+  const float toward_v[3] = {0.5f, 0.5f + 0.5f * 0.6f, 0.5f + 0.5f * 0.8f};
+  Material m = test::diffuse(0.5f, 0.5f, 0.5f);
+  m.height_texture = 0, m.bump_distance = 0.5f, m.normal_texture = 1;
+  const auto textures = [&] {
+    return std::vector<Texture>{grey(8, 8, ramp), Texture(1, 1, 3, Texture::Format::float32, {}, toward_v)};
+  };
+  const SurfaceHit hit = above(*square(m, textures()), 0.4f, 0.45f);
+  EXPECT_LT(hit.normal.x, -0.3f);
+  EXPECT_GT(hit.normal.y, 0.4f);
+  EXPECT_NEAR(length(hit.normal), 1.0f, 1e-5f);
+  EXPECT_EQ(above(*square(m, textures(), 1.0f, true), 0.4f, 0.45f).normal, (Vec3f{0, 0, 1})) << "no direction of u";
+}
+
+TEST(Scene, TexturesOfRoughnessAndMetalMultiplyGreenAndBlue) {
+  // Packed as glTF has it: occlusion, roughness, metal.
+  const float packed[6] = {1, 0.5f, 0.25f, 1, 0.0f, 1.0f};
+  Material m = test::diffuse(0.5f, 0.5f, 0.5f);
+  m.lobe = LobeModel::ggx, m.specular = {1, 1, 1};
+  m.roughness = 0.8f, m.metallic = 0.5f, m.roughness_texture = m.metallic_texture = 0;
+  const auto scene = square(m, {Texture(2, 1, 3, Texture::Format::float32, {false, true, true}, packed)});
+  const SurfaceHit rough = above(*scene, 0.2f, 0.4f), sharp = above(*scene, 0.8f, 0.4f);
+  const GgxColors c = scene->ggx_colors(0, rough.uv);
+  EXPECT_FLOAT_EQ(c.alpha, 0.16f);
+  EXPECT_FLOAT_EQ(c.metal, 0.125f);
+  EXPECT_FLOAT_EQ(c.opaque, 0.875f);
+  // Followed where the texture makes it a mirror, shaded where it does not.
+  EXPECT_FALSE(scene->followed(rough));
+  EXPECT_TRUE(scene->followed(sharp));
+  EXPECT_FALSE(follow(*scene, rough, {0, 0, 1}, 0.5f, 0.5f, 0.5f));
+  ASSERT_TRUE(follow(*scene, sharp, {0, 0, 1}, 0.5f, 0.5f, 0.5f));
+  EXPECT_NEAR(follow(*scene, sharp, {0, 0, 1}, 0.5f, 0.5f, 0.5f)->weight.x, 0.5f * 0.5f + 0.5f * 0.04f, 1e-3f);
+  EXPECT_GT(max_component(scene->shade_point(rough, {0, 0, 1}, 0).specular), 0.0f);
+  EXPECT_EQ(max_component(scene->shade_point(sharp, {0, 0, 1}, 0).specular), 0.0f);
 }
 
 }  // namespace lumicut

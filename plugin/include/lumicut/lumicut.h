@@ -175,6 +175,14 @@ typedef struct lumicut_material {
   /* Any model */
   int32_t normal_texture;  /* 1 + index; 0: none. Linear; (r, g, b) is (1 + n)/2 of the normal along u, v and out of the surface */
   float normal_strength;   /* 0..10; 0: not given, taken as 1 */
+  int32_t height_texture;  /* 1 + index; 0: none. Linear; its luminance is how far the surface stands out, in bump_distance */
+  float bump_distance;     /* of a height of 1, in units of the world; below 0: inwards; 0: not given, taken as 1 */
+  float bump_strength;     /* 0..10, of the turned normal over the old one; 0: not given, taken as 1 */
+  /* LUMICUT_GGX alone: textures are linear and multiply, green the roughness and blue the share of metal, as in glTF */
+  int32_t roughness_texture, metallic_texture; /* 1 + index; 0: none */
+  float coat;              /* 0..1: share of a clear coat above all of it */
+  float coat_roughness;    /* 0..1, as roughness */
+  float coat_ior;          /* 1..10; 0: not given, taken as 1.5 */
 } lumicut_material;
 enum { LUMICUT_EMIT_BOTH_SIDES = 1, LUMICUT_PHONG = 2, LUMICUT_GGX = 4 };
 

@@ -1,0 +1,104 @@
+#include "scene/facet_albedo.h"
+
+#include <array>
+
+#include "scene/bsdf.h"
+
+namespace lumicut {
+
+namespace {
+
+constexpr int kRoughness = 14, kCosines = 16;  // steps in √α and √cosine
+
+// Mean over the visible facets of what `share(view, half vector)` says that comes off them.
+template <typename Share>
+float kept(float alpha, float cosine_to_viewer, const Share& share) {
+  constexpr int kSteps = 20;
+  if (alpha <= 0.0f) return 1.0f;
+  const Vec3f view{std::sqrt(std::max(0.0f, 1.0f - cosine_to_viewer * cosine_to_viewer)), 0.0f, cosine_to_viewer};
+  float sum = 0.0f;
+  for (int i = 0; i < kSteps; ++i)
+    for (int j = 0; j < kSteps; ++j)
+      sum += share(view, sample_visible_normal(view, alpha, (static_cast<float>(i) + 0.5f) / kSteps,
+                                               (static_cast<float>(j) + 0.5f) / kSteps));
+  return sum / (kSteps * kSteps);
+}
+
+float reflected(float alpha, const Vec3f& view, const Vec3f& half) {
+  const float up = reflect(view, half).z;
+  return up > 0.0f ? masking_reflected(alpha * alpha, view.z, up) : 0.0f;
+}
+
+// One row of cosines for each roughness.
+template <typename Entry>
+void fill(float* table, const Entry& entry) {
+  // Without tasks: the table of mirrors is made where whoever asks first stands, and that may be a task.
+  for (int i = 0; i < kRoughness * kCosines; ++i) {
+    const auto c = static_cast<float>(i % kCosines) / (kCosines - 1),
+               r = static_cast<float>(i / kCosines) / (kRoughness - 1);
+    table[i] = entry(r * r, std::max(1e-3f, c * c));
+  }
+}
+
+float look_up(const float* table, float alpha, float cosine) {
+  const auto place = [](float x, int steps, int& cell) {
+    const float at = std::sqrt(std::min(1.0f, std::max(0.0f, x))) * static_cast<float>(steps - 1);
+    cell = std::min(steps - 2, static_cast<int>(at));
+    return at - static_cast<float>(cell);
+  };
+  int r = 0, c = 0;
+  const float fr = place(alpha, kRoughness, r), fc = place(cosine, kCosines, c);
+  const float* row = table + r * kCosines + c;
+  const float low = row[0] + (row[1] - row[0]) * fc, high = row[kCosines] + (row[kCosines + 1] - row[kCosines]) * fc;
+  return low + (high - low) * fr;
+}
+
+struct MirrorLoss {
+  MirrorLoss() {
+    fill(of.data(), [](float alpha, float cosine) {
+      return 1.0f - kept(alpha, cosine, [&](const Vec3f& v, const Vec3f& h) { return reflected(alpha, v, h); });
+    });
+    // In c² all directions of even light count alike.
+    constexpr int kSteps = 64;
+    for (int r = 0; r < kRoughness; ++r) {
+      const float root = static_cast<float>(r) / (kRoughness - 1);
+      float sum = 0.0f;
+      for (int i = 0; i < kSteps; ++i)
+        sum += look_up(of.data(), root * root, std::sqrt((static_cast<float>(i) + 0.5f) / kSteps));
+      std::fill_n(mean.data() + r * kCosines, kCosines, sum / kSteps);
+    }
+  }
+  std::array<float, kRoughness * kCosines> of{}, mean{};
+};
+
+const MirrorLoss& mirror_loss() {
+  static const MirrorLoss loss;
+  return loss;
+}
+
+}  // namespace
+
+float facet_loss(float alpha, float cosine) { return look_up(mirror_loss().of.data(), alpha, cosine); }
+float mean_facet_loss(float alpha) { return look_up(mirror_loss().mean.data(), alpha, 1.0f); }
+
+GlassAlbedo::GlassAlbedo(float ior) : ior_(ior), table_(2 * kRoughness * kCosines) {
+  for (const bool inside : {false, true}) {
+    const float ratio = inside ? 1.0f / ior : ior;
+    fill(table_.data() + (inside ? kRoughness * kCosines : 0), [&](float alpha, float cosine_to_viewer) {
+      return kept(alpha, cosine_to_viewer, [&](const Vec3f& view, const Vec3f& h) {
+        const float cosine = std::min(1.0f, std::max(0.0f, dot(view, h)));
+        float refracted = 0.0f;
+        const float border = fresnel_reflectance(cosine, ratio, refracted);
+        const float down = view.z / ratio - h.z * (cosine / ratio - refracted);
+        return border * reflected(alpha, view, h) +
+               (down > 0.0f ? (1.0f - border) * masking_transmitted(alpha * alpha, down) : 0.0f);
+      });
+    });
+  }
+}
+
+float GlassAlbedo::at(bool inside, float alpha, float cosine) const {
+  return look_up(table_.data() + (inside ? kRoughness * kCosines : 0), alpha, cosine);
+}
+
+}  // namespace lumicut
