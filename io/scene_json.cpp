@@ -269,11 +269,20 @@ class SceneReader {
       if (!of_model) value->fail(ggx ? "is not of the model \"ggx\"" : "is of the model \"ggx\" alone");
       out = static_cast<float>(value->number(low, high));
     };
+    if (auto fresnel = object.find("fresnel")) {
+      if (!ggx) fresnel->fail("is of the model \"ggx\" alone");
+      m.flags = (m.flags & ~uint32_t{LUMICUT_NO_FRESNEL}) | (fresnel->boolean() ? 0u : uint32_t{LUMICUT_NO_FRESNEL});
+    }
+    if (!ggx) m.flags &= ~uint32_t{LUMICUT_NO_FRESNEL};
     number("shininess", m.shininess, 0, 1e6, !ggx);
     number("roughness", m.roughness, 0, 1, ggx);
     number("metallic", m.metallic, 0, 1, ggx);
-    number("ior", m.ior, 0.1, 10, ggx);
     number("transmission", m.transmission, 0, 1, ggx);
+    if ((m.flags & LUMICUT_NO_FRESNEL) != 0)
+      for (const char* key : {"metallic", "transmission"})
+        if (auto given = object.find(key); given && given->number(0, 1) > 0)
+          given->fail("must be 0 where \"fresnel\" is false");
+    number("ior", m.ior, 0.1, 10, ggx);
     number("coat", m.coat, 0, 1, ggx);
     number("coat_roughness", m.coat_roughness, 0, 1, ggx);
     number("coat_ior", m.coat_ior, 1, 10, ggx);

@@ -61,9 +61,14 @@ Texture to_texture(const lumicut_texture& in, uint64_t index) {
 
 Material to_material(const lumicut_material& in, uint64_t index) {
   const Checked c("lumicut_material", index);
-  c.flags("flags", in.flags, LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG | LUMICUT_GGX);
+  c.flags("flags", in.flags, LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG | LUMICUT_GGX | LUMICUT_NO_FRESNEL);
   if ((in.flags & LUMICUT_PHONG) != 0 && (in.flags & LUMICUT_GGX) != 0)
     c.fail("flags", "holds both LUMICUT_PHONG and LUMICUT_GGX");
+  if ((in.flags & LUMICUT_NO_FRESNEL) != 0) {
+    if ((in.flags & LUMICUT_GGX) == 0) c.fail("flags", "holds LUMICUT_NO_FRESNEL without LUMICUT_GGX");
+    if (in.metallic > 0.0f) c.fail("metallic", "must be 0 with LUMICUT_NO_FRESNEL");
+    if (in.transmission > 0.0f) c.fail("transmission", "must be 0 with LUMICUT_NO_FRESNEL");
+  }
   c.range("diffuse", in.diffuse, 0.0f, 1.0f);
   c.range("specular", in.specular, 0.0f, 1.0f);
   c.range("shininess", in.shininess, 0.0f, 1e6f);
@@ -82,6 +87,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   m.shininess = in.shininess;
   if ((in.flags & LUMICUT_PHONG) != 0) m.lobe = LobeModel::phong;
   if ((in.flags & LUMICUT_GGX) != 0) m.lobe = LobeModel::ggx;
+  m.fresnel = (in.flags & LUMICUT_NO_FRESNEL) == 0;
   m.roughness = in.roughness, m.metallic = in.metallic, m.transmission = in.transmission;
   m.ior = in.ior == 0.0f ? 1.5f : in.ior;
   m.coat = in.coat, m.coat_roughness = in.coat_roughness;

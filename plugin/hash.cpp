@@ -34,7 +34,7 @@ uint64_t scene_hash(const Scene& scene) {
     add(m.diffuse), add(m.specular), add(m.emission);
     values.insert(values.end(),
                   {m.shininess, m.opacity, static_cast<float>(m.diffuse_texture), static_cast<float>(m.lobe),
-                   m.roughness, m.metallic, m.ior, m.transmission, m.normal_strength,
+                   m.fresnel ? 1.0f : 0.0f, m.roughness, m.metallic, m.ior, m.transmission, m.normal_strength,
                    static_cast<float>(m.normal_texture), static_cast<float>(m.height_texture), m.bump_distance,
                    m.bump_strength, static_cast<float>(m.roughness_texture), static_cast<float>(m.metallic_texture),
                    m.coat, m.coat_roughness, m.coat_ior});

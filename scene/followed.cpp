@@ -34,8 +34,8 @@ std::optional<Followed> follow(const Scene& scene, const SurfaceHit& hit, const 
     for (int k = 0; k < 3; ++k) passed[k] = clear * (1.0f - border) * std::sqrt(std::max(0.0f, c.base[k]));
   }
   if (alpha < kLeastAlpha) {
-    const float p = schlick_share(cosine), edge = c.grazing * p;
-    reflected += c.specular * (1.0f - p) + Rgb{edge, edge, edge};
+    const float p = schlick_share(cosine);
+    reflected += c.specular * (1.0f - p) + c.grazing * p;
   }
   float coat = 0.0f;
   if (material.coat > 0.0f) {

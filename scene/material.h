@@ -24,6 +24,8 @@ struct Material {
   float shininess = 0.0f;
   LobeModel lobe = LobeModel::blinn;
   // GGX alone: `diffuse` is the base colour, `specular` multiplies the dielectric's reflectance at normal incidence.
+  // Without `fresnel` it is the lobe's own reflectance at every angle, beside Lambert's `diffuse`: no metal, no glass.
+  bool fresnel = true;
   float roughness = 0.5f, metallic = 0.0f, ior = 1.5f, transmission = 0.0f;
   float coat = 0.0f, coat_roughness = 0.0f, coat_ior = 1.5f;  // a clear layer over all of this; `coat`: its share
   float opacity = 1.0f;
@@ -60,7 +62,7 @@ struct GgxColors {
   float metal, opaque, clear;  // shares of metal, coated diffuse and glass; sum 1
   Rgb f0;                      // of the dielectric's border
   Rgb specular;                // F0 of metal and dielectric together
-  float grazing;               // F90 of both
+  Rgb grazing;                 // F90 of both
   float alpha;                 // roughness²
 
   // A lobe that paths follow, without regard to a clear coat.

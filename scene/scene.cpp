@@ -354,7 +354,7 @@ void Scene::set_ggx(const Material& material, const GgxColors& colors, const Vec
   p.diffuse = base.scale * kInvPi;
   p.fade = base.fade;
   p.shininess = -std::max(kLeastAlpha, colors.alpha);
-  if (colors.alpha >= kLeastAlpha) p.specular = colors.specular, p.grazing = Rgb{1, 1, 1} * colors.grazing;
+  if (colors.alpha >= kLeastAlpha) p.specular = colors.specular, p.grazing = colors.grazing;
   if (!(material.coat > 0.0f)) return;
   // The diffuse part gets what the coat leaves of the light's directions on the average, the lobe what it leaves of the
   // view's: that of the light too, where the lobe is a mirror's.
@@ -416,7 +416,7 @@ float Scene::metallic_of(const Material& m, Vec2f uv) const {
 
 GgxColors Scene::ggx_colors(uint32_t material, Vec2f uv) const {
   const Material& m = materials_[material];
-  GgxColors c;
+  GgxColors c{};
   c.base = diffuse_texel(m, uv);
   c.metal = metallic_of(m, uv);
   c.clear = (1.0f - c.metal) * m.transmission;
@@ -425,12 +425,17 @@ GgxColors Scene::ggx_colors(uint32_t material, Vec2f uv) const {
   if (m.roughness_texture >= 0)
     roughness *= std::min(1.0f, std::max(0.0f, textures_[m.roughness_texture].color(uv.x, uv.y).y));
   c.alpha = roughness * roughness;
+  if (!m.fresnel) {
+    c.metal = c.clear = 0.0f, c.opaque = 1.0f;
+    c.specular = c.grazing = specular_texel(m, uv);
+    return c;
+  }
   const float r = (m.ior - 1.0f) / (m.ior + 1.0f);
   c.f0 = specular_texel(m, uv) * (r * r);
   c.specular = c.base * c.metal + c.f0 * c.opaque;
   // What hardly reflects has no bright edge either.
   const auto edge = [](const Rgb& f0) { return std::min(1.0f, 50.0f * max_component(f0)); };
-  c.grazing = edge(c.base) * c.metal + edge(c.f0) * c.opaque;
+  c.grazing = Rgb{1, 1, 1} * (edge(c.base) * c.metal + edge(c.f0) * c.opaque);
   return c;
 }
 

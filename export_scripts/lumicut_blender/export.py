@@ -162,6 +162,8 @@ class Writer:
         out = {"name": name, "diffuse": numbers(m.diffuse), "specular": numbers(m.specular)}
         if m.flags & library.GGX:
             out["model"] = "ggx"
+            if m.flags & library.NO_FRESNEL:
+                out["fresnel"] = False
             for key in ("roughness", "metallic", "ior", "transmission"):
                 out[key] = numbers([getattr(m, key)])[0]
             if m.coat > 0:

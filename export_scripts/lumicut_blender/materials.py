@@ -95,6 +95,7 @@ class Surface:
     metal: Value = ZERO
     glass: Value = ZERO  # of what passes two borders
     coat: Value = ZERO   # reflectance at normal incidence
+    gloss: Value = ZERO  # reflectance at every angle
     roughness: float = 0.5
     ior: float = 1.5
     emission: Value = ZERO
@@ -130,7 +131,7 @@ class SurfaceReader(Evaluator):
     def weighted(self, f, a, g, b):
         """f·a + g·b; the rougher or brighter gloss decides the roughness by its share."""
         def gloss(s):
-            return luminance(s.metal) + luminance(s.glass) + luminance(s.coat)
+            return luminance(s.metal) + luminance(s.glass) + luminance(s.coat) + luminance(s.gloss)
 
         wa, wb = f.scalar() * gloss(a), g.scalar() * gloss(b)
         if wa > 0 and wb > 0 and abs(a.roughness - b.roughness) > 0.05:
@@ -141,7 +142,7 @@ class SurfaceReader(Evaluator):
             self.note("roughness", "Textures taken as their mean")
 
         def weight(h, s):
-            return h.scalar() * sum(luminance(getattr(s, slot)) for slot in ("diffuse", "metal", "glass", "coat"))
+            return h.scalar() * sum(luminance(getattr(s, slot)) for slot in ("diffuse", "metal", "glass", "coat", "gloss"))
 
         by_place = None
         if a.by_place or b.by_place:
@@ -157,7 +158,7 @@ class SurfaceReader(Evaluator):
             clearcoat = ClearCoat(min(1.0, whole), sum(h * c.share * c.roughness for h, c in coats) / whole,
                                   max(coats, key=lambda x: x[0] * x[1].share)[1].ior)
         summed = {slot: self.add(self.multiply(f, getattr(a, slot)), self.multiply(g, getattr(b, slot)))
-                  for slot in ("diffuse", "metal", "glass", "coat", "emission", "opacity")}
+                  for slot in ("diffuse", "metal", "glass", "coat", "gloss", "emission", "opacity")}
         return Surface(roughness=roughness, ior=a.ior if luminance(a.glass) > luminance(b.glass) else b.ior,
                        rough_picture=picture, by_place=by_place, clearcoat=clearcoat, **summed)
 
@@ -245,7 +246,13 @@ class SurfaceReader(Evaluator):
     def closure_bsdf_glossy(self, node, stack):
         self.bumps(node, stack)
         gloss = self.gloss(node, stack)
-        return Surface(metal=self.metal(node, self.value(node.inputs["Color"], stack), gloss), **gloss)
+        colour = self.value(node.inputs["Color"], stack)
+        again = ZERO
+        if getattr(node, "distribution", "") == "MULTI_GGX":
+            # What single scattering loses and the facets reflect again, evenly: c (1 − L) · c L/(1 − c L).
+            lost = float(np.interp(gloss["roughness"] ** 2, ALPHAS, LOSSES))
+            again = self.apply("scattered again", lambda c: c * c * lost * (1 - lost) / (1 - c * lost), colour)
+        return Surface(gloss=colour, diffuse=again, **gloss)
 
     closure_bsdf_anisotropic = closure_bsdf_glossy
 
@@ -488,13 +495,17 @@ class Materials:
     def _gloss(self, surface, name, m):
         """Values of the slots diffuse and specular, and of roughness and metallic where they are pictures; flags and
         numbers into `m`."""
-        d, metal, glass = luminance(surface.diffuse), luminance(surface.metal), luminance(surface.glass)
-        coat, diffuse = surface.coat, surface.diffuse
-        if metal + glass + luminance(coat) <= 0 and surface.clearcoat is None:
-            return {"diffuse": diffuse, "specular": ZERO}
-        m.flags |= library.GGX
         evaluator = Evaluator(name, self.images, self.report)
         add = evaluator.add
+        # A lobe without Fresnel stands beside Lambert alone; beside other shaders it counts as metal.
+        bare = surface.by_place is None and all(luminance(v) <= 0 for v in (surface.metal, surface.glass, surface.coat))
+        if luminance(surface.gloss) > 0 and not bare:
+            surface = dataclasses.replace(surface, metal=add(surface.metal, surface.gloss), gloss=ZERO)
+        d, metal, glass = luminance(surface.diffuse), luminance(surface.metal), luminance(surface.glass)
+        coat, diffuse = surface.coat, surface.diffuse
+        if metal + glass + luminance(coat) + luminance(surface.gloss) <= 0 and surface.clearcoat is None:
+            return {"diffuse": diffuse, "specular": ZERO}
+        m.flags |= library.GGX
         if surface.clearcoat is not None:
             c = surface.clearcoat
             m.coat, m.coat_roughness, m.coat_ior = c.share, self._raised(c.roughness, name), c.ior
@@ -508,6 +519,9 @@ class Materials:
                 value = evaluator.apply("gloss limit", lambda r: np.where((MIRROR <= r) & (r < least), least, r), value)
             pictured["roughness"] = value
         m.roughness, m.ior = self._raised(surface.roughness, name), min(10.0, max(0.1, surface.ior))
+        if luminance(surface.gloss) > 0:
+            m.flags |= library.NO_FRESNEL
+            return {**pictured, "diffuse": diffuse, "specular": surface.gloss}
         if surface.by_place is not None:
             pictured["metallic"] = surface.by_place.metallic
             f0, glass = surface.by_place.f0, 0.0

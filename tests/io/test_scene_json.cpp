@@ -223,11 +223,17 @@ TEST(SceneJson, GgxHasItsOwnParameters) {
   EXPECT_EQ(pane.transmission, 1.0f);
   EXPECT_EQ(pane.ior, 1.33f);
   EXPECT_EQ(pane.specular[0], 0.5f);
+  scene["materials"].push_back(
+      {{"name", "mixed"}, {"model", "ggx"}, {"fresnel", false}, {"specular", {0.2, 0.2, 0.2}}});
+  const SceneData more = read_scene(folder.write("scene.json", scene.dump()));
+  EXPECT_EQ(more.materials.back().values.flags, uint32_t{LUMICUT_GGX | LUMICUT_NO_FRESNEL});
   const auto wrong = [&](const json& material) {
     json other = json::parse(kScene);
     other["materials"].push_back(material);
     return error_of([&] { read_scene(folder.write("wrong.json", other.dump())); });
   };
+  expect_in(wrong({{"name", "a"}, {"fresnel", false}}), {"fresnel", "\"ggx\" alone"});
+  expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"fresnel", false}, {"metallic", 0.5}}), {"metallic", "must be 0"});
   expect_in(wrong({{"name", "a"}, {"roughness", 0.5}}), {"roughness", "\"ggx\" alone"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"shininess", 5}}), {"shininess", "not of the model \"ggx\""});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"roughness", 1.5}}), {"roughness", "1.5"});

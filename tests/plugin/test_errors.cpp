@@ -154,6 +154,9 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
       {[](M& m) { m.coat_roughness = -0.5f; }, "lumicut_material[3].coat_roughness: -0.5 is not in [0, 1]"},
       {[](M& m) { m.coat_ior = 0.5f; }, "lumicut_material[3].coat_ior: 0.5 is not in [1, 10]"},
       {[](M& m) { m.flags = LUMICUT_PHONG | LUMICUT_GGX; }, "lumicut_material[3].flags: holds both"},
+      {[](M& m) { m.flags = LUMICUT_NO_FRESNEL; }, "lumicut_material[3].flags: holds LUMICUT_NO_FRESNEL without"},
+      {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_NO_FRESNEL, m.metallic = 1; },
+       "lumicut_material[3].metallic: must be 0 with"},
       {[](M& m) { m.flags = 64; }, "lumicut_material[3].flags: 64", LUMICUT_UNSUPPORTED},
   };
   for (const auto& w : wrongs) {

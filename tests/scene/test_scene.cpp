@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include <limits>
 
 #include "core/error.h"
@@ -291,6 +293,30 @@ TEST(Scene, TexturesOfRoughnessAndMetalMultiplyGreenAndBlue) {
   EXPECT_NEAR(follow(*scene, sharp, {0, 0, 1}, 0.5f, 0.5f, 0.5f)->weight.x, 0.5f * 0.5f + 0.5f * 0.04f, 1e-3f);
   EXPECT_GT(max_component(scene->shade_point(rough, {0, 0, 1}, 0).specular), 0.0f);
   EXPECT_EQ(max_component(scene->shade_point(sharp, {0, 0, 1}, 0).specular), 0.0f);
+}
+
+TEST(Scene, WithoutFresnelALobeReflectsAsMuchAtEveryAngle) {
+  Material m = test::diffuse(0.5f, 0.25f, 0.125f);
+  m.lobe = LobeModel::ggx, m.fresnel = false, m.specular = {0.3f, 0.2f, 0.1f};
+  for (const float roughness : {0.5f, 0.0f}) {
+    m.roughness = roughness;
+    const auto scene = square(m, {});
+    const SurfaceHit hit = above(*scene, 0.4f, 0.4f);
+    for (const Vec3f view : {Vec3f{0, 0, 1}, normalize(Vec3f{1, 0, 0.05f})}) {
+      const SurfacePoint p = scene->shade_point(hit, view, 0);
+      EXPECT_NEAR(p.diffuse.x * std::numbers::pi_v<float>, 0.5f, 1e-6f);
+      EXPECT_EQ(p.fade, 0.0f) << "Lambert";
+      if (roughness > 0.0f) {
+        EXPECT_EQ(p.specular, m.specular);
+        EXPECT_EQ(p.grazing, m.specular);
+      } else {
+        const auto followed = follow(*scene, hit, view, 0.5f, 0.5f, 0.5f);
+        ASSERT_TRUE(followed);
+        EXPECT_NEAR(followed->weight.x, 0.3f, 1e-6f);
+        EXPECT_NEAR(followed->weight.z, 0.1f, 1e-6f);
+      }
+    }
+  }
 }
 
 }  // namespace lumicut

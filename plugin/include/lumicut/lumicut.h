@@ -167,7 +167,9 @@ typedef struct lumicut_material {
   float opacity;           /* share of the rays that the surface stops, times its texture; 0: not given, taken as 1; below 1/256 a hole */
   float emission[3];       /* radiance, on the side the geometric normal points to */
   int32_t diffuse_texture, specular_texture, opacity_texture, emission_texture; /* 1 + index into the textures; 0: none. Factors multiply */
-  /* LUMICUT_GGX alone: diffuse is the base colour, specular multiplies the dielectric's reflectance ((ior-1)/(ior+1))^2 */
+  /* LUMICUT_GGX alone: diffuse is the base colour, specular multiplies the dielectric's reflectance ((ior-1)/(ior+1))^2.
+     With LUMICUT_NO_FRESNEL specular is the lobe's reflectance at every angle, beside a Lambertian diffuse (which shading
+     trees call a mix of diffuse and glossy): diffuse + specular <= 1 keeps energy; no metallic, transmission */
   float roughness;         /* 0..1; the distribution's alpha is its square */
   float metallic;          /* 0..1 */
   float ior;               /* 0.1..10; 0: not given, taken as 1.5 */
@@ -184,7 +186,7 @@ typedef struct lumicut_material {
   float coat_roughness;    /* 0..1, as roughness */
   float coat_ior;          /* 1..10; 0: not given, taken as 1.5 */
 } lumicut_material;
-enum { LUMICUT_EMIT_BOTH_SIDES = 1, LUMICUT_PHONG = 2, LUMICUT_GGX = 4 };
+enum { LUMICUT_EMIT_BOTH_SIDES = 1, LUMICUT_PHONG = 2, LUMICUT_GGX = 4, LUMICUT_NO_FRESNEL = 8 };
 
 typedef struct lumicut_mesh {
   uint32_t struct_size;
