@@ -6,6 +6,7 @@ packages=(
   build-essential cmake ninja-build pkg-config git ccache clang-format  # tools
   libembree-dev libtbb-dev libhwy-dev libboost-dev                      # the library: rays, threads, SIMD, Student's t
   libopenexr-dev libimath-dev libopenimageio-dev libtinyobjloader-dev   # the command's files
+  openimageio-tools                                                     # their CMake files ask for the programs too
   nlohmann-json3-dev libcli11-dev libfmt-dev                            # the command's words
   libcgal-dev libgmp-dev libmpfr-dev                                    # geometry/ (a target of its own)
   libgtest-dev libgmock-dev libbenchmark-dev python3 python3-numpy      # tests and benchmarks
