@@ -56,9 +56,9 @@ def main():
     mean = reference.image.mean()
     off = (cells(np.mean(ours, 0)) - cells(reference.image)) / mean
     noise = np.hypot(standard_error(ours), standard_error(reference.parts)) / mean
-    print("Lumicut less Cycles, in % of the mean:")
-    for row in off:
-        print("  " + " ".join(f"{100 * x:+6.2f}" for x in row))
+    print("Lumicut less Cycles, and the noise of that, in % of the mean:")
+    for row, of_row in zip(off, noise):
+        print("  " + "  ".join(f"{100 * x:+6.2f} ± {100 * n:.2f}" for x, n in zip(row, of_row)))
     print(f"mean {100 * (np.mean(ours) / mean - 1):+.2f} %, largest {100 * np.abs(off).max():.2f} %, noise at most {100 * noise.max():.2f} %")
 
 

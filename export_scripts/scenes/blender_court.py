@@ -52,13 +52,13 @@ def main():
     texture = tree.nodes.new("ShaderNodeTexEnvironment")
     texture.image = image
     tree.links.new(texture.outputs[0], next(n for n in tree.nodes if n.type == "BACKGROUND").inputs["Color"])
-    stone, plaster = s.principled("stone", (0.6, 0.57, 0.52)), s.principled("plaster", (0.72, 0.6, 0.45))
-    roof, water = s.principled("roof", (0.5, 0.24, 0.15)), s.glossy_mix("water", (0.04, 0.08, 0.1), 0.5, 0.2)
-    paving = s.principled("paving", (0.5, 0.5, 0.5))
+    stone, plaster = s.matte("stone", (0.6, 0.57, 0.52)), s.matte("plaster", (0.72, 0.6, 0.45))
+    roof, water = s.matte("roof", (0.5, 0.24, 0.15)), s.glossy_mix("water", (0.04, 0.08, 0.1), 0.5, 0.2)
+    paving = s.matte("paving", (0.5, 0.5, 0.5))
     node = paving.node_tree.nodes.new("ShaderNodeTexImage")
     node.image = tiles("paving", 256, options.seed)
-    shader = next(n for n in paving.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
-    paving.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+    shader = next(n for n in paving.node_tree.nodes if n.type == "BSDF_DIFFUSE")
+    paving.node_tree.links.new(node.outputs["Color"], shader.inputs["Color"])
     ground = s.mesh("ground", [(-14, -14, 0), (14, -14, 0), (14, 14, 0), (-14, 14, 0)], [(0, 1, 2, 3)], paving)
     ground.data.uv_layers.new(name="UVMap").data.foreach_set("uv", [0, 0, 6, 0, 6, 6, 0, 6])
     for name, low, high in (("back wall", (-9.4, 9.0, 0), (9.4, 9.4, 5)), ("left wall", (-9.4, -6.0, 0), (-9.0, 9.0, 5)),
@@ -81,7 +81,7 @@ def main():
     for i in range(8):
         x, y = (-8.2 if i % 2 else 8.2), -4.5 + 3.2 * (i // 2)
         s.turned("pot", [(0.0, 0.0), (0.25, 0.0), (0.4, 0.35), (0.3, 0.6), (0.36, 0.68)],
-                 s.principled(f"pot {i}", tuple(rng.uniform(0.15, 0.6, 3))), 32, (x, y, 0))
+                 s.matte(f"pot {i}", tuple(rng.uniform(0.15, 0.6, 3))), 32, (x, y, 0))
     s.camera((3.6, -10.5, 2.3), (-0.6, 2.0, 1.5), 24)
     s.finish(options)
 

@@ -13,8 +13,8 @@ def main():
     options = s.arguments(__doc__, seed=1, lamps=10000, bays=9, width=480, height=320)
     scene = s.begin(options.width, options.height)
     rng = np.random.default_rng(options.seed)
-    stone, floor = s.principled("stone", (0.66, 0.6, 0.5)), s.glossy_mix("floor", (0.3, 0.28, 0.26), 0.12, 0.4)
-    wood = s.principled("wood", (0.36, 0.22, 0.12))
+    stone, floor = s.matte("stone", (0.66, 0.6, 0.5)), s.glossy_mix("floor", (0.3, 0.28, 0.26), 0.12, 0.4)
+    wood = s.matte("wood", (0.36, 0.22, 0.12))
     half, bay = 6.0, 4.0
     length = bay * options.bays
     s.mesh("floor", [(-half, 0, 0), (half, 0, 0), (half, length, 0), (-half, length, 0)], [(0, 1, 2, 3)], floor)

@@ -14,10 +14,10 @@ def main():
     scene = s.begin(options.width, options.height)
     rng = np.random.default_rng(options.seed)
     next(n for n in scene.world.node_tree.nodes if n.type == "BACKGROUND").inputs["Color"].default_value = (0.5, 0.7, 1.0, 1)
-    wall, ceiling = s.principled("wall", (0.75, 0.7, 0.58)), s.principled("ceiling", (0.8, 0.8, 0.78))
+    wall, ceiling = s.matte("wall", (0.75, 0.7, 0.58)), s.matte("ceiling", (0.8, 0.8, 0.78))
     terracotta = s.glossy_mix("terracotta", (0.45, 0.2, 0.11), 0.1, 0.35)
     tile, worktop = s.glossy_mix("tile", (0.7, 0.72, 0.68), 0.12, 0.3), s.glossy_mix("worktop", (0.12, 0.12, 0.13), 0.2, 0.3)
-    front, wood = s.glossy_mix("front", (0.25, 0.38, 0.3), 0.06, 0.4), s.principled("wood", (0.4, 0.24, 0.12), 0.6)
+    front, wood = s.glossy_mix("front", (0.25, 0.38, 0.3), 0.06, 0.4), s.matte("wood", (0.4, 0.24, 0.12))
     copper, steel = s.principled("copper", (0.8, 0.42, 0.25), 0.35, 0, 1), s.principled("steel", (0.6, 0.6, 0.62), 0.4, 0, 1)
     china = s.glossy_mix("china", (0.7, 0.7, 0.66), 0.08, 0.3)
     w, d, h = 5.0, 4.2, 2.6

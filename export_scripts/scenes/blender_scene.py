@@ -4,6 +4,7 @@
 """
 import argparse
 import math
+import os
 import sys
 
 import bpy
@@ -37,7 +38,7 @@ def finish(options):
     if hasattr(scene, "lumicut"):
         scene.render.engine = "LUMICUT"
     if options.output:
-        bpy.ops.wm.save_as_mainfile(filepath=bpy.path.abspath(options.output), compress=True)
+        bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath(options.output), compress=True)
 
 
 def link(ob):
