@@ -215,7 +215,8 @@ class BenchCommand {
     if (!old.is_object() || old.value("format", "") != kFormat || !old.contains("rows") || !old["rows"].is_array())
       throw io::FileError(results_file(), fmt::format("is no {} to go on with", kFormat));
     // Rows of another library or machine are no part of this table: ratios between them would mean nothing.
-    if (old.value("git", "") != results_["git"] || old["machine"]["processor"] != results_["machine"]["processor"]) {
+    if (old.value("git", "") != results_["git"].get<std::string>() ||
+        old["machine"]["processor"] != results_["machine"]["processor"]) {
       say(fmt::format("{} is of another version or machine: all runs begin anew", results_file()));
       return;
     }
