@@ -8,7 +8,7 @@
 
 `truth` renders the path tracer in parts of their own seeds, and keeps what was rendered before: how the parts differ is the
 noise of their mean, which is taken off errors in quadrature. `curve` goes on from one number of passes to the next by its
-checkpoint. What follows -- is given to `lumicut render`. Needs numpy and OpenImageIO's Python module (python3-openimageio).
+checkpoint. The truth that `coverage` compares with may be of so many times the size. What follows -- is given to `lumicut render`. Needs numpy and OpenImageIO's Python module (python3-openimageio).
 """
 import argparse
 import json
@@ -106,7 +106,9 @@ def coverage(options):
         for seed in range(1, options.seeds + 1):
             path = options.folder / f"{options.name}.{passes}.seed{seed}.exr"
             render(options, path, *options.arguments, "--passes", passes, "--seed", seed, "--layers", "radiance,error")
-            off = np.abs(load(path) @ [0.2126, 0.7152, 0.0722] - luminance)
+            image = load(path) @ [0.2126, 0.7152, 0.0722]
+            side = luminance.shape[0] // image.shape[0]  # of the truth's pixels in one of these
+            off = np.abs(image - luminance.reshape(image.shape[0], side, image.shape[1], side).mean((1, 3)))
             shares.append((off <= load(path, "error")).mean())
         print(f"| {passes} | {100 * np.mean(shares):.1f} % | {100 * min(shares):.1f}-{100 * max(shares):.1f} % |", flush=True)
 
