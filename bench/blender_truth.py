@@ -51,7 +51,7 @@ def main():
         image, cpu, _ = measured(lambda: path_traced(part))
         ours.append(image)
         print(f"Lumicut, part {part}: {cpu:.0f} CPU s", flush=True)
-    np.save(options.folder / "lumicut.image", np.mean(ours, 0))
+    np.savez_compressed(options.folder / "lumicut.npz", image=np.mean(ours, 0))  # the .npy files are Cycles' parts
     reference = Reference(options.folder)
     mean = reference.image.mean()
     off = (cells(np.mean(ours, 0)) - cells(reference.image)) / mean
