@@ -44,11 +44,7 @@ void check_scene(const Options& o) {
   io::Handle<lumicut_scene> scene(api);
   io::Handle<lumicut_integrator> integrator(api);
   InterruptWatcher watcher(api);  // ends before the handles that it may cancel
-  lumicut_device_desc device_desc{};
-  device_desc.struct_size = sizeof(device_desc);
-  device_desc.abi_major = LUMICUT_ABI_MAJOR;
-  device_desc.threads = o.threads;
-  io::check(api, api.device_create(&device_desc, device.out()), "device");
+  create_device(api, o, device);
   create_scene(api, o, device.get(), scene);
   create_integrator(api, o, device.get(), integrator);
   const auto size = o.size.empty() ? std::vector<uint32_t>{} : numbers(o.size, 'x', 2, "--size");
@@ -63,11 +59,7 @@ void check_scene(const Options& o) {
   desc.height = size.empty() ? data.height : size[1];
   desc.samples = o.samples > 0 ? o.samples : data.samples;
   bar.show("acceleration structure", 0, 0);
-  watcher.watch(scene.get());
-  const lumicut_result committed = api.scene_commit(scene.get());
-  watcher.watch(nullptr);
-  stop_if_interrupted();
-  io::check(api, committed, o.scene);
+  commit_scene(api, watcher, scene.get(), o.scene);
   // Before the examination, whose own memory is not the render's.
   std::optional<Forecast> cost;
   if (!o.no_forecast) {

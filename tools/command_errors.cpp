@@ -104,11 +104,7 @@ class ErrorsCommand {
   std::string path(const std::string& name) const { return (std::filesystem::path(o_.folder) / name).string(); }
 
   void create() {
-    lumicut_device_desc desc{};
-    desc.struct_size = sizeof(desc);
-    desc.abi_major = LUMICUT_ABI_MAJOR;
-    desc.threads = o_.threads;
-    io::check(api(), api().device_create(&desc, device_.out()), "device");
+    create_device(api(), o_, device_);
     create_scene(api(), o_, device_.get(), scene_);
     create_integrator(api(), o_, device_.get(), method_);  // a wrong parameter shall not wait for big files
     if (o_.integrator == "path_tracer")
@@ -120,11 +116,7 @@ class ErrorsCommand {
     stop_if_interrupted();
     io::upload_scene(api(), scene_.get(), data);
     bar_.show("acceleration structure", 0, 0);
-    watcher_.watch(scene_.get());
-    const lumicut_result committed = api().scene_commit(scene_.get());
-    watcher_.watch(nullptr);
-    stop_if_interrupted();
-    io::check(api(), committed, o_.scene);
+    commit_scene(api(), watcher_, scene_.get(), o_.scene);
     frame_.struct_size = sizeof(frame_);
     frame_.width = size_.empty() ? data.width : size_[0];
     frame_.height = size_.empty() ? data.height : size_[1];

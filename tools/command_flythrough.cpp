@@ -146,11 +146,7 @@ class FlythroughCommand {
   const io::Api& api() const { return library_.api(); }
 
   void create() {
-    lumicut_device_desc desc{};
-    desc.struct_size = sizeof(desc);
-    desc.abi_major = LUMICUT_ABI_MAJOR;
-    desc.threads = o_.threads;
-    io::check(api(), api().device_create(&desc, device_.out()), "device");
+    create_device(api(), o_, device_);
     create_scene(api(), o_, device_.get(), scene_);
     create_integrator(api(), o_, device_.get(), integrator_);
     state_ = static_cast<const lumicut_state_extension*>(api().get_extension(LUMICUT_STATE_EXTENSION));

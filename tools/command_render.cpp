@@ -212,11 +212,7 @@ class RenderCommand {
   void commit() {
     const double start = now();
     bar_.show("acceleration structure", 0, 0);
-    watcher_.watch(scene_.get());
-    const lumicut_result result = api().scene_commit(scene_.get());
-    watcher_.watch(nullptr);
-    stop_if_interrupted();
-    io::check(api(), result, o_.scene);
+    commit_scene(api(), watcher_, scene_.get(), o_.scene);
     commit_seconds_ = now() - start;
   }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "tools/commands.h"
+#include "tools/interrupt_watcher.h"
 
 namespace lumicut::tools {
 
@@ -22,6 +23,22 @@ void add_setup_options(CLI::App& command, RenderSetup& setup) {
   command.add_option("--rays", setup.rays, "robust: none slips between two triangles; fast: some may, in less time")
       ->check(CLI::IsMember({"robust", "fast"}))
       ->capture_default_str();
+}
+
+void create_device(const io::Api& api, const RenderSetup& setup, io::Handle<lumicut_device>& device) {
+  lumicut_device_desc desc{};
+  desc.struct_size = sizeof(desc);
+  desc.abi_major = LUMICUT_ABI_MAJOR;
+  desc.threads = setup.threads;
+  io::check(api, api.device_create(&desc, device.out()), "device");
+}
+
+void commit_scene(const io::Api& api, InterruptWatcher& watcher, lumicut_scene scene, const std::string& file) {
+  watcher.watch(scene);
+  const lumicut_result committed = api.scene_commit(scene);
+  watcher.watch(nullptr);
+  stop_if_interrupted();
+  io::check(api, committed, file);
 }
 
 void create_scene(const io::Api& api, const RenderSetup& setup, lumicut_device device,

@@ -14,6 +14,8 @@ class App;
 
 namespace lumicut::tools {
 
+class InterruptWatcher;
+
 struct RenderSetup {
   std::string integrator, accel = "embree", rays = "robust";
   std::vector<std::string> parameters;  // name=value
@@ -23,6 +25,10 @@ struct RenderSetup {
 
 // -i, -p, --vpls, --seed, --threads, --accel, --rays.
 void add_setup_options(CLI::App& command, RenderSetup& setup);
+
+void create_device(const io::Api& api, const RenderSetup& setup, io::Handle<lumicut_device>& device);
+// Builds what rays need of the scene of that file; Ctrl-C ends it.
+void commit_scene(const io::Api& api, InterruptWatcher& watcher, lumicut_scene scene, const std::string& file);
 
 // Both throw UsageError in the library's words where it refuses what the command line says.
 void create_scene(const io::Api& api, const RenderSetup& setup, lumicut_device device,
