@@ -29,8 +29,8 @@ struct Ray {
   uint32_t flags = 0;
 };
 
-// Fields in Embree's order (RTCHit). `ng` is not normalised, and in the space of the mesh (before the instance's
-// transform).
+// Fields in Embree's order (RTCHit). `ng` is not normalised and is in the mesh's own space: an instance's transform has
+// not been applied to it.
 struct Hit {
   Vec3f ng;
   float u = 0.0f, v = 0.0f;  // hit = (1-u-v)·v0 + u·v1 + v·v2
@@ -78,7 +78,7 @@ struct AccelOptions {
   std::string builder = "";  // agglomerative accel only: see accel/bvh.h; empty: its default
 };
 
-// What a build gave. Costs in the paper's terms. [Walter et al. 2008, Fig. 6]; 0 where the room behind does not tell.
+// What a build gave. Costs as in [Walter et al. 2008, Fig. 6]; 0 where the accel does not compute them.
 struct AccelInfo {
   uint64_t triangles = 0, nodes = 0, bytes = 0;
   double build_seconds = 0, expected_boxes = 0, expected_tris = 0, expected_cost = 0;

@@ -10,18 +10,16 @@
 namespace lumicut::io {
 
 // Every function of lumicut.h, under its name without "lumicut_".
-#define LUMICUT_FOR_ALL_FUNCTIONS(X)                                                                                \
-  X(version)                                                                                                        \
-  X(last_error)                                                                                                     \
-  X(get_extension)                                                                                                  \
-  X(device_create) X(retain) X(release) X(get_status) X(cancel) X(stats_json) X(accel_build) X(accel_get_info)      \
-      X(accel_get_node) X(accel_get_primitives) X(accel_intersect) X(accel_occluded) X(scene_create)                \
-          X(scene_set_textures) X(scene_set_materials) X(scene_add_mesh) X(scene_update_mesh) X(scene_set_profiles) \
-              X(scene_set_lights) X(scene_set_environment) X(scene_set_camera) X(scene_set_trace) X(scene_commit)   \
-                  X(get_integrator_info) X(get_param_info) X(integrator_create) X(integrator_set) X(integrator_get) \
-                      X(integrator_set_lights) X(integrator_prepare) X(integrator_get_lights) X(integrator_shade)   \
-                          X(get_channel_info) X(render_start) X(render_wait) X(render_next_tile) X(render_read)     \
-                              X(render_groups) X(render_checkpoint)
+// clang-format off
+#define LUMICUT_FOR_ALL_FUNCTIONS(X)                                                                                         \
+  X(version) X(last_error) X(get_extension) X(device_create) X(retain) X(release) X(get_status) X(cancel) X(stats_json)      \
+  X(accel_build) X(accel_get_info) X(accel_get_node) X(accel_get_primitives) X(accel_intersect) X(accel_occluded)            \
+  X(scene_create) X(scene_set_textures) X(scene_set_materials) X(scene_add_mesh) X(scene_update_mesh) X(scene_set_profiles)  \
+  X(scene_set_lights) X(scene_set_environment) X(scene_set_camera) X(scene_set_trace) X(scene_commit)                        \
+  X(get_integrator_info) X(get_param_info) X(integrator_create) X(integrator_set) X(integrator_get) X(integrator_set_lights) \
+  X(integrator_prepare) X(integrator_get_lights) X(integrator_shade) X(get_channel_info)                                     \
+  X(render_start) X(render_wait) X(render_next_tile) X(render_read) X(render_groups) X(render_checkpoint)
+// clang-format on
 
 struct Api {
 #define LUMICUT_MEMBER(name) decltype(&lumicut_##name) name = nullptr;

@@ -42,7 +42,7 @@ struct DirectSample {
   Vpl vpl;
   bool seen_by_rays = false;  // paths may find it too: a mesh, the environment, a rectangle or disk [lamp_surfaces.h]
   bool on_mesh = false;
-  double density = 0.0;       // of what rays find: for each unit of area, or for each steradian of the environment
+  double density = 0.0;  // of what rays find: for each unit of area, or for each steradian of the environment
 };
 
 // Radiance of a rectangle or disk at the cosine to its axis, above 0.

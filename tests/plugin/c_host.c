@@ -56,9 +56,8 @@ int main(int argc, char** argv) {
   lumicut_integrator integrator = NULL;
   lumicut_render render = NULL;
   lumicut_device_desc device_desc = {sizeof device_desc, LUMICUT_ABI_MAJOR, 0, 0, NULL, NULL};
-  lumicut_material materials[2] = {
-      {.struct_size = sizeof materials[0], .diffuse = {0.7f, 0.7f, 0.7f}},
-      {.struct_size = sizeof materials[0], .diffuse = {0.7f, 0.2f, 0.1f}}};
+  lumicut_material materials[2] = {{.struct_size = sizeof materials[0], .diffuse = {0.7f, 0.7f, 0.7f}},
+                                   {.struct_size = sizeof materials[0], .diffuse = {0.7f, 0.2f, 0.1f}}};
   lumicut_mesh mesh = {0};
   lumicut_light lamp = {0};
   lumicut_camera camera = {0};

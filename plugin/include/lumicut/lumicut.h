@@ -21,6 +21,9 @@
 
 #include <stdint.h>
 
+/* Fields and their comments stay tables. */
+/* clang-format off */
+
 #if defined(LUMICUT_BUILDING)
 #define LUMICUT_API __attribute__((visibility("default")))
 #else
