@@ -95,7 +95,8 @@ void tree(const std::string& scenes) {
   }
 }
 
-void rivals(const FaceMesh& m, uint32_t k, size_t cut, double seconds) {
+void rivals([[maybe_unused]] const FaceMesh& m, uint32_t k, size_t cut, double seconds) {
+  // m: METIS and meshoptimizer may both be absent.
   std::printf("       cut edges at k = %u: ours %zu (%.2f s)", k, cut, seconds);
 #ifdef LUMICUT_HAS_METIS
   const DualGraph g = dual_graph(m);
@@ -104,8 +105,8 @@ void rivals(const FaceMesh& m, uint32_t k, size_t cut, double seconds) {
   idx_t n = static_cast<idx_t>(m.faces.size()), one = 1, parts = static_cast<idx_t>(k), edge_cut = 0;
   int status = 0;
   const double metis = time_of([&] {
-    status = METIS_PartGraphKway(&n, &one, offset.data(), neighbour.data(), nullptr, nullptr, nullptr, &parts, nullptr, nullptr,
-                        nullptr, &edge_cut, part.data());
+    status = METIS_PartGraphKway(&n, &one, offset.data(), neighbour.data(), nullptr, nullptr, nullptr, &parts, nullptr,
+                                 nullptr, nullptr, &edge_cut, part.data());
   });
   if (status == METIS_OK) std::printf(", METIS %lld (%.2f s)", static_cast<long long>(edge_cut), metis);
 #endif
