@@ -3,13 +3,16 @@
 set -euo pipefail
 
 packages=(
-  build-essential cmake ninja-build pkg-config git ccache clang-format  # tools
+  build-essential cmake ninja-build pkg-config git ccache               # tools
+  clang libclang-rt-dev                                                 # builds with sanitizers, fuzzing
+  clang-format clang-tidy pyflakes3 shellcheck                          # tools/dev/lint.sh
   libembree-dev libtbb-dev libhwy-dev libboost-dev                      # the library: rays, threads, SIMD, Student's t
   libopenexr-dev libimath-dev libopenimageio-dev libtinyobjloader-dev   # the command's files
   openimageio-tools                                                     # their CMake files ask for the programs too
   nlohmann-json3-dev libcli11-dev libfmt-dev                            # the command's words
   libcgal-dev libgmp-dev libmpfr-dev                                    # geometry/ (a target of its own)
   libgtest-dev libgmock-dev libbenchmark-dev python3 python3-numpy      # tests and benchmarks
+  libmetis-dev libmeshoptimizer-dev libnanoflann-dev                    # rivals in the tables of bench/geometry
   binutils                                                              # a test reads the library's symbols
   chromium                                                              # a test opens the report's page
   blender xvfb xauth xdotool imagemagick libgl1-mesa-dri                # the Blender add-on's tests, with and without a window

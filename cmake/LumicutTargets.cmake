@@ -23,7 +23,8 @@ endif()
 
 add_library(lumicut_options INTERFACE)
 # GCC 12 sees overlaps in std::string that are not there (GCC bug 105329).
-target_compile_options(lumicut_options INTERFACE -Wall -Wextra -Wshadow -Werror -Wno-restrict
+target_compile_options(lumicut_options INTERFACE -Wall -Wextra -Wshadow -Werror
+  $<$<OR:$<C_COMPILER_ID:GNU>,$<CXX_COMPILER_ID:GNU>>:-Wno-restrict>
   $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor -Woverloaded-virtual>)
 # Highway compiles hot loops for a portable fallback, SSE4, AVX2 and AVX-512, and picks one at run time.
 # Sanitizers take minutes a file and set: they check one, and the fallback.
@@ -35,8 +36,13 @@ endif()
 target_compile_definitions(lumicut_options INTERFACE "HWY_DISABLED_TARGETS=${disabled_targets}")
 target_include_directories(lumicut_options INTERFACE ${PROJECT_SOURCE_DIR})
 if(LUMICUT_SANITIZE)
-  target_compile_options(lumicut_options INTERFACE -fsanitize=${LUMICUT_SANITIZE} -fno-omit-frame-pointer -g)
+  # A finding of UndefinedBehaviorSanitizer ends the program: a test that goes on would pass.
+  target_compile_options(lumicut_options INTERFACE -fsanitize=${LUMICUT_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(lumicut_options INTERFACE -fsanitize=${LUMICUT_SANITIZE})
+endif()
+# Counts edges in every object, so that the same build serves the sanitized tests and libFuzzer's targets (tests/fuzz/).
+if(LUMICUT_FUZZ)
+  target_compile_options(lumicut_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
 # lumicut_library(NAME SOURCES... LINK libs...): one folder, one static library, linked into the plug-in.
