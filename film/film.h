@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/fields.h"
 #include "core/vec.h"
 
 namespace lumicut {
@@ -39,6 +40,7 @@ struct Rect {
   uint32_t width() const { return x1 - x0; }
   uint32_t height() const { return y1 - y0; }
   bool operator==(const Rect&) const = default;
+  LUMICUT_FIELDS(Rect, x0, y0, x1, y1)
 };
 
 class Film {

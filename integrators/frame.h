@@ -19,9 +19,12 @@ struct FrameOptions {
   struct CameraSamples {
     uint64_t seed;  // the same in all passes
     uint64_t first;
+    LUMICUT_FIELDS(CameraSamples, seed, first)
   };
   std::optional<CameraSamples> camera_samples;
   bool illuminance = false;  // fill that channel: about as long again
+  LUMICUT_FIELDS(FrameOptions, width, height, samples, tile_size, crop, seed, compensate, spheres, camera_samples,
+                 illuminance)
 };
 
 // Tiles of the crop in the order they are rendered.

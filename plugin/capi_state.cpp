@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "plugin/check.h"
-#include "plugin/hash.h"
+#include "plugin/identity.h"
 #include "plugin/include/lumicut/lumicut_state.h"
 #include "plugin/objects.h"
 #include "plugin/state.h"
@@ -15,55 +15,58 @@ using namespace lumicut;
 namespace {
 
 constexpr char kMagic[8] = {'L', 'U', 'M', 'I', 'C', 'U', 'T', 'S'};
-constexpr uint32_t kVersion = 2, kByteOrder = 0x01020304u;
+constexpr char kIntegrator[] = "integrator";
+constexpr uint32_t kVersion = 3, kByteOrder = 0x01020304u;
 
-// Followed by the integrator's id, its parameters as text, the lights, and the method's own bytes.
+// Followed by what it was made for as text, the lights, and the method's own bytes.
 struct Header {
   char magic[8];
   uint32_t version, byte_order;
   uint64_t size;      // of all
-  uint64_t checksum;  // of all that follows the header, and of the fields below
-  uint64_t scene;     // hash of its geometry
+  uint64_t checksum;  // of the header with 0 here, and of all that follows it
   uint64_t lights, light_paths;
   uint64_t method_bytes;
-  uint32_t id_bytes, params_bytes;
-  uint32_t host_lights, reserved;
+  uint32_t key_bytes, host_lights;
 };
-static_assert(sizeof(Header) == 80);
+static_assert(sizeof(Header) == 64);
 
-uint64_t checksum(const Header& h, const uint8_t* body, size_t size) {
-  const uint64_t fields[] = {h.size,
-                             h.scene,
-                             h.lights,
-                             h.light_paths,
-                             h.method_bytes,
-                             uint64_t{h.id_bytes} << 32 | h.params_bytes,
-                             uint64_t{h.host_lights} << 32 | h.reserved};
-  return hash_bytes(hash_bytes(7, fields, sizeof(fields)), body, size);
+uint64_t checksum(Header h, const uint8_t* body, size_t size) {
+  h.checksum = 0;
+  return hash_bytes(hash_bytes(0, &h, sizeof(h)), body, size);
+}
+
+// Of all that lights and structures depend on: any camera may look at them.
+std::string state_key(const lumicut_integrator_t& i, const Params& params, const Scene& scene) {
+  Identity key;
+  key.add(kIntegrator, std::string(i.entry.id));
+  key.add(params);
+  key.add(scene, false);
+  return key.text();
 }
 
 std::vector<uint8_t> save(lumicut_integrator_t& i) {
   if (i.prepared == nullptr) fail_state("lumicut_integrator: nothing is prepared, so nothing can be saved");
   const Prepared& p = *i.prepared;
+  const Gate::Hold reading = p.scene->gate.read("lumicut_state_extension.save");
+  if (p.scene->changed || p.scene_version != p.scene->scene.version())
+    fail_state("lumicut_integrator: its scene was changed since it was prepared");
   const std::vector<uint8_t> own = p.method->save_state();
-  const std::string id = i.entry.id;
+  const std::string key = state_key(i, *p.params, p.scene->scene);
   Header h{};
   std::memcpy(h.magic, kMagic, sizeof(kMagic));
   h.version = kVersion, h.byte_order = kByteOrder;
-  h.scene = geometry_hash(p.scene->scene);
   h.lights = p.vpls->lights.size(), h.light_paths = p.vpls->light_paths;
   h.method_bytes = own.size();
-  h.id_bytes = static_cast<uint32_t>(id.size()), h.params_bytes = static_cast<uint32_t>(p.params_key.size());
+  h.key_bytes = static_cast<uint32_t>(key.size());
   h.host_lights = p.host_lights != 0 ? 1 : 0;
-  h.size = sizeof(Header) + id.size() + p.params_key.size() + h.lights * sizeof(Vpl) + own.size();
+  h.size = sizeof(Header) + key.size() + h.lights * sizeof(Vpl) + own.size();
   std::vector<uint8_t> out(h.size);
   uint8_t* at = out.data() + sizeof(h);
   const auto append = [&](const void* data, size_t size) {
     if (size > 0) std::memcpy(at, data, size);
     at += size;
   };
-  append(id.data(), id.size());
-  append(p.params_key.data(), p.params_key.size());
+  append(key.data(), key.size());
   append(p.vpls->lights.data(), h.lights * sizeof(Vpl));
   append(own.data(), own.size());
   h.checksum = checksum(h, out.data() + sizeof(h), out.size() - sizeof(h));
@@ -72,19 +75,6 @@ std::vector<uint8_t> save(lumicut_integrator_t& i) {
 }
 
 [[noreturn]] void fail_bytes(const std::string& what) { fail_argument("state: " + what); }
-
-// Throws Error naming the first parameter that differs.
-void compare_params(const std::string& saved, const std::string& now) {
-  size_t a = 0, b = 0;
-  while (a < saved.size() && b < now.size()) {
-    const size_t a_end = saved.find('\n', a), b_end = now.find('\n', b);
-    const std::string one = saved.substr(a, a_end - a), other = now.substr(b, b_end - b);
-    if (one != other) fail_bytes("it was made with " + one + ", but the integrator has " + other);
-    if (a_end == std::string::npos || b_end == std::string::npos) break;
-    a = a_end + 1, b = b_end + 1;
-  }
-  if (saved.size() != now.size()) fail_bytes("its parameters are not this integrator's");
-}
 
 void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uint64_t size, Progress& progress,
           Stats& stats) {
@@ -103,17 +93,18 @@ void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uin
     if (count > left / each) fail_bytes("its parts are longer than it is: damaged");
     left -= count * each;
   };
-  take(h.id_bytes, 1), take(h.params_bytes, 1), take(h.lights, sizeof(Vpl)), take(h.method_bytes, 1);
+  take(h.key_bytes, 1), take(h.lights, sizeof(Vpl)), take(h.method_bytes, 1);
   const uint8_t* at = bytes + sizeof(h);
   if (left != 0 || checksum(h, at, size - sizeof(h)) != h.checksum) fail_bytes("its checksum is wrong: damaged");
 
-  const std::string id(reinterpret_cast<const char*>(at), h.id_bytes);
-  if (id != i.entry.id) fail_bytes("it is of \"" + id + "\", not of \"" + i.entry.id + "\"");
-  at += h.id_bytes;
-  const std::string params(reinterpret_cast<const char*>(at), h.params_bytes);
-  compare_params(params, params_text(i.params));
-  at += h.params_bytes;
-  if (h.scene != geometry_hash(s.scene)) fail_bytes("it was made for a scene of other geometry");
+  const std::string made_for(reinterpret_cast<const char*>(at), h.key_bytes);
+  if (const auto differs = difference(made_for, state_key(i, i.params, s.scene))) {
+    if (differs->name == kIntegrator)
+      fail_bytes("it is of \"" + differs->saved + "\", not of \"" + differs->now + "\"");
+    fail_bytes("it was made for a scene of other geometry, materials or lights, or with other parameters: " +
+               differs->text());
+  }
+  at += h.key_bytes;
   auto vpls = std::make_shared<VplSet>();
   vpls->light_paths = h.light_paths;
   vpls->lights.resize(h.lights);
@@ -128,7 +119,7 @@ void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uin
   auto next = std::make_unique<Prepared>();
   next->scene = Ref(s);
   next->scene_version = s.scene.version();
-  next->params_key = params;
+  next->params_key = params_text(i.params);
   next->vpls_key = tracing_key(i.params);
   next->host_lights = h.host_lights != 0 ? i.host_lights_sets + 1 : 0;
   next->params = i.params;

@@ -490,6 +490,7 @@ PassOptions to_pass_options(const lumicut_render_desc& in) {
   c.range("target_error", in.target_error, 0.0f, 1e6f);
   c.range("confidence", in.confidence, 0.0f, 0.999999f);
   c.flags("flags", in.flags, LUMICUT_CHECKPOINTS | LUMICUT_ILLUMINANCE | LUMICUT_GROUPS);
+  if (in.checkpoint != nullptr && in.checkpoint_size == 0) c.fail("checkpoint_size", "0 bytes are no checkpoint");
   if (in.checkpoint == nullptr && in.checkpoint_size != 0)
     c.fail("checkpoint", "is NULL, but checkpoint_size is " + number_text(in.checkpoint_size));
   PassOptions o;

@@ -4,23 +4,29 @@
 
 #include "core/rng.h"
 #include "plugin/check.h"
-#include "plugin/hash.h"
+#include "plugin/identity.h"
 
 namespace lumicut {
 
 namespace {
 
 constexpr char kMagic[8] = {'L', 'U', 'M', 'I', 'C', 'U', 'T', 'P'};
-constexpr uint32_t kVersion = 1, kByteOrder = 0x01020304u;
+constexpr char kInstructions[] = "instructions";
+constexpr uint32_t kVersion = 2, kByteOrder = 0x01020304u;
 
 struct Header {
   char magic[8];
   uint32_t version, byte_order;
-  uint64_t key, checksum;  // of the body
-  uint64_t mean_bytes, film_bytes;
-  uint32_t passes, reserved;
+  uint64_t checksum;  // of the header with 0 here, and of all that follows: the key, the mean and the film
+  uint64_t key_bytes, mean_bytes, film_bytes;
+  uint64_t passes;
 };
 static_assert(sizeof(Header) == 56);
+
+uint64_t checksum(Header h, std::span<const uint8_t> body) {
+  h.checksum = 0;
+  return hash_bytes(hash_bytes(0, &h, sizeof(h)), body.data(), body.size());
+}
 
 [[noreturn]] void fail_checkpoint(const std::string& what) { fail_argument("lumicut_render_desc.checkpoint: " + what); }
 
@@ -47,48 +53,61 @@ bool enough_passes(const PassOptions& options, uint32_t done, double seconds, do
   return options.target_error > 0.0 && done >= kMinPassesForError && error <= options.target_error;
 }
 
-std::vector<uint8_t> save_passes(uint64_t key, uint32_t done, const PassMean& mean, const Film& film) {
+std::vector<uint8_t> save_passes(const std::string& key, uint32_t done, const PassMean& mean, const Film& film) {
   std::vector<uint8_t> bytes(sizeof(Header));
+  bytes.insert(bytes.end(), key.begin(), key.end());
   mean.save(bytes);
   Header h{};
   std::memcpy(h.magic, kMagic, sizeof(kMagic));
-  h.version = kVersion, h.byte_order = kByteOrder, h.key = key, h.passes = done;
-  h.mean_bytes = bytes.size() - sizeof(Header);
+  h.version = kVersion, h.byte_order = kByteOrder, h.passes = done;
+  h.key_bytes = key.size();
+  h.mean_bytes = bytes.size() - sizeof(Header) - h.key_bytes;
   film.save(bytes);
-  h.film_bytes = bytes.size() - sizeof(Header) - h.mean_bytes;
-  h.checksum = hash_bytes(done, bytes.data() + sizeof(Header), bytes.size() - sizeof(Header));
+  h.film_bytes = bytes.size() - sizeof(Header) - h.key_bytes - h.mean_bytes;
+  h.checksum = checksum(h, std::span(bytes).subspan(sizeof(Header)));
   std::memcpy(bytes.data(), &h, sizeof(h));
   return bytes;
 }
 
-uint32_t load_passes(const std::vector<uint8_t>& bytes, uint64_t key, PassMean& mean, Film& film) {
+uint32_t load_passes(const std::vector<uint8_t>& bytes, const std::string& key, PassMean& mean, Film& film) {
   Header h{};
   if (bytes.size() < sizeof(h)) fail_checkpoint("it is too short to be one");
   std::memcpy(&h, bytes.data(), sizeof(h));
   if (std::memcmp(h.magic, kMagic, sizeof(kMagic)) != 0) fail_checkpoint("it does not begin as one");
   if (h.version != kVersion || h.byte_order != kByteOrder)
     fail_checkpoint("it is of version " + number_text(uint64_t{h.version}) + " or of another kind of machine");
-  const size_t body = bytes.size() - sizeof(h);
-  if (h.mean_bytes > body || h.film_bytes != body - h.mean_bytes ||
-      h.checksum != hash_bytes(h.passes, bytes.data() + sizeof(h), body))
+  const auto body = std::span(bytes).subspan(sizeof(h));
+  if (h.key_bytes > body.size() || h.mean_bytes > body.size() - h.key_bytes ||
+      h.film_bytes != body.size() - h.key_bytes - h.mean_bytes || h.checksum != checksum(h, body))
     fail_checkpoint("it is cut short or damaged");
-  if (h.key != key) fail_checkpoint("it was made for another scene, size, integrator or parameters");
-  const std::span<const uint8_t> all(bytes);
-  if (h.passes == 0 || !mean.load(all.subspan(sizeof(h), h.mean_bytes)) ||
-      !film.load(all.subspan(sizeof(h) + h.mean_bytes)))
+  const std::string made_for(body.begin(), body.begin() + static_cast<std::ptrdiff_t>(h.key_bytes));
+  if (const auto differs = difference(made_for, key)) {
+    if (differs->name == kInstructions)
+      fail_checkpoint("it was made with " + differs->saved + " instructions; this processor renders with " +
+                      differs->now + ", which rounds otherwise");
+    fail_checkpoint("it was made for another scene, size, integrator or parameters: " + differs->text());
+  }
+  if (h.passes == 0 || h.passes > UINT32_MAX || !mean.load(body.subspan(h.key_bytes, h.mean_bytes)) ||
+      !film.load(body.subspan(h.key_bytes + h.mean_bytes)))
     fail_checkpoint("it does not fit the film");
-  return h.passes;
+  return static_cast<uint32_t>(h.passes);
 }
 
-uint64_t passes_key(const Scene& scene, const std::string& integrator, const std::string& params,
-                    const FrameOptions& frame, double confidence) {
-  std::string text = integrator + "\n" + params;
-  for (const uint64_t v : {uint64_t{frame.width}, uint64_t{frame.height}, uint64_t{frame.samples},
-                           uint64_t{frame.tile_size}, uint64_t{frame.crop.x0}, uint64_t{frame.crop.y0},
-                           uint64_t{frame.crop.x1}, uint64_t{frame.crop.y1}, uint64_t{frame.illuminance}})
-    text += number_text(v) + "\n";
-  text += number_text(confidence);
-  return hash_bytes(scene_hash(scene), text.data(), text.size());
+std::string passes_key(const Scene& scene, const std::string& integrator, const Params& params,
+                       const VplSet* host_lights, const FrameOptions& frame, const PassOptions& options) {
+  // What is not added stops the render, or does not touch the image.
+  const auto& [passes, max_seconds, target_error, confidence, checkpoints, groups, resume] = options;
+  Identity key;
+  key.add("version", std::string(LUMICUT_VERSION_TEXT));
+  key.add(kInstructions, instruction_class());
+  key.add("integrator", integrator);
+  key.add(params);
+  key.add_fields(frame);
+  key.add("confidence", confidence);
+  key.add("groups", groups);
+  key.add_virtual_lights(host_lights);
+  key.add(scene, true);
+  return key.text();
 }
 
 }  // namespace lumicut

@@ -34,11 +34,12 @@ bool enough_passes(const PassOptions& options, uint32_t done, double seconds, do
 
 // The state after `done` whole passes, as bytes, and back. `key`: what it was made for; another one, and bytes that are
 // damaged, throw Error(invalid_argument).
-std::vector<uint8_t> save_passes(uint64_t key, uint32_t done, const PassMean& mean, const Film& film);
-uint32_t load_passes(const std::vector<uint8_t>& bytes, uint64_t key, PassMean& mean, Film& film);
+std::vector<uint8_t> save_passes(const std::string& key, uint32_t done, const PassMean& mean, const Film& film);
+uint32_t load_passes(const std::vector<uint8_t>& bytes, const std::string& key, PassMean& mean, Film& film);
 
-// Of all that decides the image beside the number of passes.
-uint64_t passes_key(const Scene& scene, const std::string& integrator, const std::string& params,
-                    const FrameOptions& frame, double confidence);
+// Of all that decides the image beside the number of passes [plugin/identity.h]. `host_lights`: null where they are
+// traced.
+std::string passes_key(const Scene& scene, const std::string& integrator, const Params& params,
+                       const VplSet* host_lights, const FrameOptions& frame, const PassOptions& options);
 
 }  // namespace lumicut

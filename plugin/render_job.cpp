@@ -116,8 +116,8 @@ void lumicut_render_t::render() {
 
 void lumicut_render_t::render_passes() {
   PassMean mean(options.crop, passes_.confidence);
-  const uint64_t key =
-      passes_key(scene_->scene, integrator_->entry.id, params_text(integrator_->params), options, passes_.confidence);
+  const std::string key = passes_key(scene_->scene, integrator_->entry.id, integrator_->params,
+                                     integrator_->host_lights.get(), options, passes_);
   uint32_t done = 0;
   double error = std::numeric_limits<double>::infinity(), last_seconds = 0.0;
   const auto finish_pass = [&] {
@@ -141,9 +141,15 @@ void lumicut_render_t::render_passes() {
     for (uint32_t row = 0; row < rows_; ++row)
       for (uint32_t column = 0; column < columns_; ++column) tile_done(tile_rect(column, row));
   }
+  const auto enough = [&] { return done > 0 && enough_passes(passes_, done, work.seconds(), last_seconds, error); };
+  if (enough()) {
+    // All was in the checkpoint. The integrator has the lights of the last pass, as after any render.
+    integrator_->prepare(*scene_, params_of_pass(integrator_->params, done - 1, scene_->scene), *progress_, stats);
+    return;
+  }
   Film pass(options.crop, film_.groups());
   std::vector<OfGroup> of_groups;
-  while (done == 0 || !enough_passes(passes_, done, work.seconds(), last_seconds, error)) {
+  do {
     const double start = work.seconds();
     integrator_->prepare(*scene_, params_of_pass(integrator_->params, done, scene_->scene), *progress_, stats);
     const Prepared& prepared = *integrator_->prepared;
@@ -164,7 +170,7 @@ void lumicut_render_t::render_passes() {
     ++done;
     last_seconds = work.seconds() - start;
     finish_pass();
-  }
+  } while (!enough());
 }
 
 const std::vector<uint8_t>& lumicut_render_t::checkpoint() {

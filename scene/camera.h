@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "core/fields.h"
 #include "core/rng.h"
 #include "core/vec.h"
 
@@ -17,6 +18,8 @@ struct Camera {
   float near_clip = 0.0f, far_clip = std::numeric_limits<float>::infinity();
   float pixel_aspect = 1.0f;
   float lens_radius = 0.0f, focus_distance = 1.0f;
+  LUMICUT_FIELDS(Camera, orthographic, position, right, up, forward, tan_half_fov_y, height, shift_x, shift_y,
+                 near_clip, far_clip, pixel_aspect, lens_radius, focus_distance)
 
   struct Sample {
     Vec3f origin, direction;  // unit direction

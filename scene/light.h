@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "core/fields.h"
 #include "core/vec.h"
 
 namespace lumicut {
@@ -25,6 +26,8 @@ struct Light {
   float spread = 3.14159265f;  // rectangle, disk: opening angle; π: Lambertian
   uint32_t profile = 0;  // point: id of a LightProfile [vpl/light_profile.h] about `direction`, `value` its largest
   Vec3f tangent{};       // profile: unit, where its horizontal angle 0 lies; orthogonal to `direction`
+  LUMICUT_FIELDS(Light, type, group, value, position, radius, direction, cos_outer, blend_cosine, spot_cosine, u, v,
+                 spread, profile, tangent)
 };
 
 struct Environment {
@@ -33,6 +36,7 @@ struct Environment {
   uint32_t group = 0;
   float world_to_map[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   bool hidden = false;  // from camera rays alone
+  LUMICUT_FIELDS(Environment, color, texture, group, world_to_map, hidden)
   bool black() const { return !(max_component(color) > 0.0f); }
 };
 

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <numbers>
 
+#include "core/fields.h"
 #include "core/vec.h"
 #include "scene/facet_albedo.h"
 
@@ -37,6 +38,10 @@ struct Material {
   int32_t height_texture = -1;
   int32_t roughness_texture = -1, metallic_texture = -1;  // GGX alone; green and blue, as glTF packs them
   int32_t diffuse_texture = -1, specular_texture = -1, opacity_texture = -1, emission_texture = -1;
+  LUMICUT_FIELDS(Material, diffuse, specular, shininess, lobe, fresnel, roughness, metallic, ior, transmission, coat,
+                 coat_roughness, coat_ior, opacity, emission, emit_both_sides, normal_strength, normal_texture,
+                 bump_strength, bump_distance, height_texture, roughness_texture, metallic_texture, diffuse_texture,
+                 specular_texture, opacity_texture, emission_texture)
 
   bool emissive() const { return max_component(emission) > 0.0f; }
   float coat_alpha() const { return coat_roughness * coat_roughness; }

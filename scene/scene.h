@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "accel/accel.h"
+#include "core/fields.h"
 #include "scene/camera.h"
 #include "scene/facet_albedo.h"
 #include "scene/light.h"
@@ -28,6 +29,7 @@ struct Mesh {
   uint32_t material = 0;
   uint32_t mask = 0xffffffffu;
   uint32_t group = 0;
+  LUMICUT_FIELDS(Mesh, positions, normals, uvs, indices, triangle_materials, instances, material, mask, group)
 
   size_t triangle_count() const { return indices.size() / 3; }
   uint32_t material_of(uint32_t triangle) const {
@@ -50,6 +52,7 @@ class Scene final : private HitFilter {
   struct Config {
     std::string accel = "embree";
     bool robust = true;
+    LUMICUT_FIELDS(Config, accel, robust)
   };
   // Makes the host's own tracer over this scene's geometry (accel/host_accel.h).
   using AccelFactory = std::function<std::unique_ptr<Accel>(const AccelGeometry&)>;
@@ -75,6 +78,24 @@ class Scene final : private HitFilter {
   bool committed() const { return committed_; }
   // Rises with each commit: integrators prepared against an older one prepare again.
   uint64_t version() const { return version_; }
+
+  // Calls visit(name, part) for all that the host set, a tracer of its own as whether there is one. Each member is
+  // named here, so that a new one does not compile before it is decided whether it is visited or follows from the
+  // others.
+  template <typename Visit>
+  void for_each_part(Visit&& visit) const {
+    const auto& [config, textures, materials, glass, coated, meshes, lights, environment, camera, has_camera, trace,
+                 accel, first_instance, instanced, committed, version, bounds, radius, epsilon] = *this;
+    const bool host_trace = trace != nullptr;
+    visit("accel", config);
+    visit("host_trace", host_trace);
+    visit("textures", textures);
+    visit("materials", materials);
+    visit("meshes", meshes);
+    visit("lights", lights);
+    visit("environment", environment);
+    visit("camera", camera);
+  }
 
   const Accel& accel() const { return *accel_; }
   const std::vector<Mesh>& meshes() const { return meshes_; }

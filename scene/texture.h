@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/fields.h"
 #include "core/vec.h"
 
 namespace lumicut {
@@ -15,6 +16,7 @@ class Texture {
     bool srgb = false;     // decode colour channels (never alpha) from sRGB
     bool clamp = false;    // else repeat
     bool nearest = false;  // else bilinear
+    LUMICUT_FIELDS(Options, srgb, clamp, nearest)
   };
 
   // `pixels`: height rows of width texels of `channels` (1..4) values, packed, row 0 on top (v = 1). Copied.
@@ -46,6 +48,7 @@ class Texture {
   Options options_;
   std::vector<uint8_t> bytes_;
   std::vector<float> floats_;
+  LUMICUT_FIELDS(Texture, width_, height_, channels_, format_, options_, bytes_, floats_)
 };
 
 }  // namespace lumicut

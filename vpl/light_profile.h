@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/fields.h"
 #include "core/vec.h"
 
 namespace lumicut {
@@ -38,6 +39,7 @@ class LightProfile {
   std::vector<double> cdf_;  // of flux over cells
   float largest_ = 0, cos_outer_ = -1;
   uint32_t id_ = 0;
+  LUMICUT_FIELDS(LightProfile, vertical_, horizontal_, values_, cdf_, largest_, cos_outer_, id_)
 };
 
 // Keeps the profile for good; one of the same content is kept once. Never 0. Throws Error where 4096 are kept already.

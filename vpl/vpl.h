@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/fields.h"
 #include "core/vec.h"
 
 namespace lumicut {
@@ -23,6 +24,8 @@ struct Vpl {
   // Spot: id of a LightProfile [vpl/light_profile.h] in place of the falloff above; then blend_cosine, spot_cosine and
   // spread_tan are the unit vector where its horizontal angle 0 lies, and intensity is that of its largest value.
   uint32_t profile = 0;
+  LUMICUT_FIELDS(Vpl, position, kind, normal, group, intensity, cos_outer, blend_cosine, spot_cosine, spread_tan,
+                 profile)
 
   // A sphere is an oriented light spread over a ball [Hašan et al. 2009: virtual spherical lights]; spot alone
   // otherwise.
@@ -54,6 +57,7 @@ inline float spot_profile(const Vpl& v, const Vec3f& direction) {
 struct VplSet {
   std::vector<Vpl> lights;
   uint64_t light_paths = 0;  // that were started; 0 for a host's own lights
+  LUMICUT_FIELDS(VplSet, lights, light_paths)
 };
 
 }  // namespace lumicut

@@ -363,8 +363,9 @@ typedef struct lumicut_render_desc {
   float confidence;   /* of the interval in the channel `error`; 0: 0.95 */
   uint32_t flags;     /* LUMICUT_CHECKPOINTS: keep what lumicut_render_checkpoint shows; LUMICUT_ILLUMINANCE: fill that
                          channel; LUMICUT_GROUPS: one image for each light group too, in channels "radiance.GROUP" */
-  const void* checkpoint; /* go on from there: scene, integrator, parameters and the fields above but the stops must be the
-                             same, and so is the image, bit for bit. NULL: begin */
+  const void* checkpoint; /* go on from there: scene, integrator, parameters, the library's version and the fields above but
+                             the stops must be the same, and so is the image, bit for bit. One that holds all that is asked
+                             for, or more, gives the image that it holds. NULL: begin */
   uint64_t checkpoint_size;
 } lumicut_render_desc;
 enum { LUMICUT_CHECKPOINTS = 1, LUMICUT_ILLUMINANCE = 2, LUMICUT_GROUPS = 4 };
