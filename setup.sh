@@ -5,7 +5,7 @@ set -euo pipefail
 packages=(
   build-essential cmake ninja-build pkg-config git ccache               # tools
   clang libclang-rt-dev                                                 # builds with sanitizers, fuzzing
-  clang-format clang-tidy pyflakes3 shellcheck                          # tools/dev/lint.sh
+  clang-format clang-tidy flake8 shellcheck                             # tools/dev/lint.sh
   libembree-dev libtbb-dev libhwy-dev libboost-dev                      # the library: rays, threads, SIMD, Student's t
   libopenexr-dev libimath-dev libopenimageio-dev libtinyobjloader-dev   # the command's files
   openimageio-tools                                                     # their CMake files ask for the programs too

@@ -7,6 +7,7 @@ size=96x72
 for scene in cornell_box indirect_room court; do
   folder=reference_images/$scene
   command="lumicut render $folder/$scene.json -i exhaustive --vpls $vpls --seed 1 --size $size --layers radiance -o $folder/ref.exr"
+  # shellcheck disable=SC2086  # a command and its words
   build/release/bin/${command}
   cat > "$folder/ref.json" <<JSON
 {"command": "$command", "commit": "$(git rev-parse --short HEAD)", "vpls": $vpls, "seed": 1, "width": ${size%x*}, "height": ${size#*x}}

@@ -119,7 +119,7 @@ class LumicutEngine(bpy.types.RenderEngine):
             raise collect.Cancelled
 
     def _render(self, depsgraph):
-        lib = runtime.require()
+        runtime.require()
         scene = depsgraph.scene_eval
         settings = depsgraph.scene.lumicut
         started = time.perf_counter()

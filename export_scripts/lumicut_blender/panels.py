@@ -21,7 +21,7 @@ class LUMICUT_OT_preset(bpy.types.Operator):
     bl_idname = "lumicut.preset"
     bl_label = "Lumicut Preset"
     bl_options = {"REGISTER", "UNDO"}
-    preset: EnumProperty(name="Preset", items=[(key, row[0], row[1]) for key, row in properties.PRESETS.items()])
+    preset: EnumProperty(name="Preset", items=[(key, row[0], row[1]) for key, row in properties.PRESETS.items()])  # noqa: F821
 
     @classmethod
     def poll(cls, context):
@@ -59,8 +59,8 @@ class LUMICUT_OT_export(bpy.types.Operator, ExportHelper):
     bl_idname = "export_scene.lumicut"
     bl_label = "Export Lumicut Scene"
     filename_ext = ".json"
-    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
-    check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})  # noqa: F722, F821
+    check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})  # noqa: F821
 
     def execute(self, context):
         path = pathlib.Path(bpy.path.abspath(self.filepath))

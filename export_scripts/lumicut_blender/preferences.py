@@ -10,8 +10,8 @@ class LumicutPreferences(bpy.types.AddonPreferences):
     bl_idname = __package__
 
     library_path: StringProperty(
-        name="Library", subtype="FILE_PATH", default="",
-        description="File or folder of the Lumicut library, where the add-on does not bring one. Then press Reload Library")
+        name="Library", subtype="FILE_PATH", default="",  # noqa: F722, F821
+        description="File or folder of the Lumicut library, where the add-on does not bring one. Then press Reload Library")  # noqa: F722
 
     def draw(self, context):
         layout = self.layout

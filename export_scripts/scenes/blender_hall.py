@@ -11,7 +11,7 @@ import blender_scene as s  # noqa: E402
 
 def main():
     options = s.arguments(__doc__, seed=1, lamps=10000, bays=9, width=480, height=320)
-    scene = s.begin(options.width, options.height)
+    s.begin(options.width, options.height)
     rng = np.random.default_rng(options.seed)
     stone, floor = s.matte("stone", (0.66, 0.6, 0.5)), s.glossy_mix("floor", (0.3, 0.28, 0.26), 0.12, 0.4)
     wood = s.matte("wood", (0.36, 0.22, 0.12))

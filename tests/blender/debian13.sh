@@ -21,6 +21,7 @@ if [ ! -x "$tree/usr/bin/dpkg" ]; then
 fi
 missing=()
 for package in "${packages[@]}"; do
+  # shellcheck disable=SC2016  # dpkg-query expands it
   chroot "$tree" dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q "ok installed" || missing+=("$package")
 done
 if [ ${#missing[@]} -gt 0 ]; then

@@ -1,7 +1,6 @@
 """The lumicut command as its users meet it: exit codes, messages, files whole or absent, Ctrl-C."""
 import json
 import os
-import pathlib
 import pty
 import select
 import signal
