@@ -523,11 +523,11 @@ int main(int argc, char** argv) {
   for (const std::string& name : names) {
     BenchMesh mesh;
     if (name == "soup")
-      mesh = soup(200000, seed);
+      mesh = soup(sized(200000, 1000), seed);
     else if (name == "scan")
-      mesh = scan(100000);
+      mesh = scan(sized(100000, 1000));
     else if (name == "house")
-      mesh = house(300000, seed);
+      mesh = house(sized(300000, 1000), seed);
     else if (!folder.empty())
       mesh = load_obj(folder, name);
     if (mesh.indices.empty())

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/smoke.h"
 #include "core/vec.h"
 
 namespace lumicut::bench {

@@ -27,6 +27,22 @@ Light panel(const Vec3f& corner, const Vec3f& u, const Vec3f& v, float radiance)
   return l;
 }
 
+BenchMesh box(const Vec3f& lo, const Vec3f& hi) {
+  BenchMesh mesh;
+  for (int i = 0; i < 8; ++i) mesh.positions.push_back({i & 1 ? hi.x : lo.x, i & 2 ? hi.y : lo.y, i & 4 ? hi.z : lo.z});
+  for (const auto& q :
+       {std::array<uint32_t, 4>{0, 1, 5, 4}, {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 3, 7, 5}, {0, 1, 3, 2}, {4, 5, 7, 6}})
+    for (const uint32_t k : {0, 1, 2, 0, 2, 3}) mesh.indices.push_back(q[k]);
+  return mesh;
+}
+
+// The scene's mesh; in smoke runs a box about its views and lamps.
+BenchMesh room_mesh(const std::string& name) {
+  if (smoke()) return name == "conference" ? box({-900, 0, -700}, {1700, 600, 1100}) : box({-2, 0, -3}, {2, 3, 4.2f});
+  const std::string folder = scenes_folder();
+  return folder.empty() ? BenchMesh{} : load_obj(folder, name);
+}
+
 void add_mesh(Scene& scene, const BenchMesh& mesh, uint32_t material) {
   Mesh m;
   m.positions = mesh.positions, m.indices = mesh.indices, m.material = material;
@@ -84,8 +100,7 @@ std::vector<Rgb> exhaustive(const ExperimentScene& s, size_t first, size_t last)
 }
 
 std::unique_ptr<ExperimentScene> make_room(const std::string& name, uint32_t side, uint32_t direct, uint32_t indirect) {
-  const std::string folder = scenes_folder();
-  const BenchMesh mesh = folder.empty() ? BenchMesh{} : load_obj(folder, name);
+  const BenchMesh mesh = room_mesh(name);
   if (mesh.triangles() == 0) return nullptr;
   auto s = std::make_unique<ExperimentScene>();
   s->name = name;
@@ -125,13 +140,7 @@ std::unique_ptr<ExperimentScene> make_lantern(const BenchMesh& mesh, uint32_t si
   s->scene = std::make_unique<Scene>(Scene::Config{});
   s->scene->set_materials(
       {Material{.diffuse = {0.6f, 0.6f, 0.6f}}, Material{.diffuse = {0.6f, 0.6f, 0.6f}, .emission = {5, 4, 3}}});
-  BenchMesh box;
-  for (int i = 0; i < 8; ++i)
-    box.positions.push_back({i & 1 ? 1.0f : -1.0f, i & 2 ? 2.0f : 0.0f, i & 4 ? 1.0f : -1.0f});
-  for (const auto& q :
-       {std::array<uint32_t, 4>{0, 1, 5, 4}, {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 3, 7, 5}, {0, 1, 3, 2}, {4, 5, 7, 6}})
-    for (const uint32_t k : {0, 1, 2, 0, 2, 3}) box.indices.push_back(q[k]);
-  add_mesh(*s->scene, box, 0);
+  add_mesh(*s->scene, box({-1, 0, -1}, {1, 2, 1}), 0);
   BenchMesh lamp = mesh;
   Aabb b;
   for (const Vec3f& p : mesh.positions) b.extend(p);

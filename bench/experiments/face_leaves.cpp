@@ -261,9 +261,9 @@ Cut cut(const ExperimentScene& s, const std::vector<Vpl>& lights, const Tree& tr
 
 bool face_leaves(const char* name) {
   const std::string folder = scenes_folder();
-  const BenchMesh mesh = folder.empty() ? BenchMesh{} : load_obj(folder, name);
+  const BenchMesh mesh = smoke() ? scan(5000) : folder.empty() ? BenchMesh{} : load_obj(folder, name);
   if (mesh.triangles() == 0) return false;
-  const auto s = make_lantern(mesh, 48, 20000);
+  const auto s = make_lantern(mesh, sized(48u, 8u), sized(20000u, 500u));
   const std::vector<Vpl>& lights = s->lights.lights;
   const float diagonal = 2.0f * s->scene->radius();
   // Which face each light is on: a ray back into the surface.

@@ -274,7 +274,7 @@ struct Score {
 }  // namespace
 
 bool records(const char* name) {
-  const auto s = make_room(name, 128, 1500, 4500);
+  const auto s = make_room(name, sized(128u, 24u), sized(1500u, 100u), sized(4500u, 300u));
   if (!s) return false;
   std::printf("\n## records, %s: %ux%u, %zu lights, %zu columns, %llu seeds: mean (least..greatest)\n", name, s->side,
               s->side, s->lights.lights.size(), kColumns, static_cast<unsigned long long>(kSeeds));

@@ -223,7 +223,7 @@ Result shade(const ExperimentScene& s, const WspdTree& tree, const Bounds& bound
 }  // namespace
 
 bool separation(const char* name) {
-  const auto s = make_room(name, 64, 1500, 4500);
+  const auto s = make_room(name, sized(64u, 12u), sized(1500u, 50u), sized(4500u, 150u));
   if (!s) return false;
   // With so wide a separation nearly every node is in a pair, and all below it have their subgroups.
   Progress progress;

@@ -69,6 +69,7 @@ void volumes() {
   for (const int d : {2, 5, 10})
     for (const char* kind : {"uniform", "cantor", "curve", "balls"})
       for (const size_t n : {100, 500, 3000}) {
+        if (n > sized<size_t>(3000, 100)) break;
         const Data data = make(kind, n, d, 1);
         double volume[5], seconds[5];
         for (int b = 0; b < 5; ++b)
@@ -80,10 +81,11 @@ void volumes() {
         for (int b = 0; b < 5; ++b) std::printf(" %8.4f", seconds[b]);
         std::printf("\n");
       }
-  std::printf("\n## bottom-up of 100000 leaves, seconds\n");
+  const auto many = sized<size_t>(100000, 1000);
+  std::printf("\n## bottom-up of %zu leaves, seconds\n", many);
   for (const int d : {2, 5, 10})
     for (const char* kind : {"uniform", "cantor", "curve", "balls"}) {
-      const Data data = make(kind, 100000, d, 1);
+      const Data data = make(kind, many, d, 1);
       double volume = 0;
       const double s = time_of(
           [&] { volume = BallTree::build(data.centres, data.radii, d, BallTreeBuilder::bottom_up).total_volume(); });
@@ -101,6 +103,7 @@ void figures() {
   for (const int d : {2, 5, 10}) std::printf(" %9s d=%-2d %9s d=%-2d", "brute", d, "heap", d);
   std::printf("\n");
   for (const size_t n : {40, 80, 120, 160, 200, 400}) {
+    if (n > sized<size_t>(400, 80)) break;
     std::printf("%6zu", n);
     for (const int d : {2, 5, 10}) {
       const Data data = make("uniform", n, d, 1);
@@ -177,7 +180,7 @@ void with_cgal(const std::vector<double>& p, const std::vector<double>& q, size_
 
 template <int D>
 void neighbours_in(const char* kind) {
-  const size_t n = 100000, m = 10000, k = 10;
+  const size_t n = sized(100000, 1000), m = sized(10000, 100), k = 10;
   const Data data = make(kind, n, D, 1), queries = make(kind, m, D, 2);
   double best[3][2] = {{1e9, 1e9}, {1e9, 1e9}, {1e9, 1e9}}, sums[3] = {0, 0, 0};
   for (int run = 0; run < 3; ++run) {

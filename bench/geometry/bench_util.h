@@ -11,6 +11,8 @@
 #include <fstream>
 #include <string>
 
+#include "bench/smoke.h"
+
 namespace lumicut::bench {
 
 inline void print_header(const char* what, int argc, char** argv, uint64_t seed) {

@@ -16,9 +16,10 @@ int main(int argc, char** argv) {
               "sample", "rounds", "seconds", "thesis 7", "sample", "unhit", "seconds", "thesis 12", "sample",
               "seconds");
   for (const char* kind : {"uniform", "gauss9"})
-    for (const size_t n : {size_t{50000}, size_t{1000000}})
+    for (const size_t n : {sized<size_t>(50000, 5000), sized<size_t>(1000000, 10000)})
       for (const double epsilon : {0.2, 0.1, 0.01, 0.001}) {
-        if (n == 1000000 && epsilon > 0.01) continue;
+        if (n >= 1000000 && epsilon > 0.01) continue;
+        if (smoke() && epsilon < 0.1) continue;
         const auto p = point_set(kind, n, 1);
         const double threshold = epsilon * static_cast<double>(n);
         EpsilonNet net[3];

@@ -58,8 +58,8 @@ int main(int argc, char** argv) {
   std::printf("%-8s %9s %10s %10s %10s %12s %12s %10s\n", "chain", "window", "dynamic", "two-stack", "hull size",
               "melkman anew", "sorted anew", "equal");
   for (const char* kind : {"walk", "zigzag", "spiral"})
-    for (size_t w = 100; w <= 1000000; w *= 10) {
-      const size_t steps = std::max<size_t>(400000, 3 * w);
+    for (size_t w = 100; w <= sized<size_t>(1000000, 1000); w *= 10) {
+      const size_t steps = std::max<size_t>(sized(400000, 4000), 3 * w);
       std::vector<Point2> points(w + steps);
       // The zigzag's window spans 4 radians, so that the chain stays simple within any window.
       for (size_t i = 0; i < points.size(); ++i) points[i] = chain_point(kind, i, w);
@@ -84,7 +84,7 @@ int main(int argc, char** argv) {
         equal = equal && h.size() == mine.size() && support_x(h) == support_x(mine) && support_x(h) == support_x(both);
       }
       if (w <= 1000) {
-        const size_t rebuilds = 2000;
+        const auto rebuilds = sized<size_t>(2000, 20);
         MelkmanDeque deque;
         melkman = time_of([&] {
                     for (size_t r = 0; r < rebuilds; ++r) {

@@ -81,7 +81,8 @@ void yardstick(const BenchMesh& mesh) {
   }
   const DiscreteDistribution by_area(areas);
   std::vector<RTCRay> rays;
-  for (uint64_t i = 0; i < 1000000; ++i) {
+  const auto count = sized<uint64_t>(1000000, 10000);
+  for (uint64_t i = 0; i < count; ++i) {
     Rng rng(1, Stage::test, i);
     const auto point = [&] {
       const size_t t = by_area.sample((static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32);
@@ -111,8 +112,9 @@ void yardstick(const BenchMesh& mesh) {
     });
     best = std::min(best, now() - start);
   }
-  std::printf("yardstick: rtcOccluded1 between random surface points: %.2f Mray/s, %.0f %% occluded\n", 1.0 / best,
-              100.0 * static_cast<double>(blocked) / 1e6);
+  std::printf("yardstick: rtcOccluded1 between random surface points: %.2f Mray/s, %.0f %% occluded\n",
+              1e-6 * static_cast<double>(count) / best,
+              100.0 * static_cast<double>(blocked) / static_cast<double>(count));
 }
 
 std::unique_ptr<Scene> make_scene(const BenchMesh& mesh) {
@@ -161,8 +163,8 @@ void exhaustive(const BenchMesh& mesh) {
   const auto scene = make_scene(mesh);
   Progress progress;
   Stats stats;
-  const VplSet vpls = off_surfaces(trace_vpls(*scene, {.count = 1000}, progress), *scene);
-  const ShadePoints points = make_points(*scene, 256);
+  const VplSet vpls = off_surfaces(trace_vpls(*scene, {.count = sized(1000u, 50u)}, progress), *scene);
+  const ShadePoints points = make_points(*scene, sized(256u, 32u));
   Params params(all_params(*find_integrator("exhaustive")));
   const auto integrator = find_integrator("exhaustive")->create();
   integrator->prepare(*scene, vpls, params, {progress, stats});
@@ -241,7 +243,7 @@ void exhaustive(const BenchMesh& mesh) {
 void light_trees(const BenchMesh& mesh) {
   const auto scene = make_scene(mesh);
   Progress progress;
-  for (const uint32_t count : {60000u, 1000000u}) {
+  for (const uint32_t count : {sized(60000u, 1000u), sized(1000000u, 5000u)}) {
     const VplSet vpls = trace_vpls(*scene, {.count = count}, progress);
     for (const auto& [name, method] : {std::pair{"agglomerative", LightTree::Method::agglomerative},
                                        {"divisive 3D", LightTree::Method::divisive_3d},
@@ -266,10 +268,10 @@ int main(int argc, char** argv) {
   using namespace lumicut;
   using namespace lumicut::bench;
   const std::string name = argc > 1 ? argv[1] : "conference", folder = scenes_folder();
-  BenchMesh mesh = folder.empty() ? BenchMesh{} : load_obj(folder, name);
+  BenchMesh mesh = folder.empty() || smoke() ? BenchMesh{} : load_obj(folder, name);
   if (mesh.triangles() == 0) {
     std::printf("no mesh %s in LUMICUT_SCENES: a generated house instead\n", name.c_str());
-    mesh = house(300000, 1);
+    mesh = house(sized(300000, 2000), 1);
   }
   Arena arena(argc > 2 ? std::atoi(argv[2]) : 0);
   std::printf("%s, %zu triangles, %d threads\n", mesh.name.c_str(), mesh.triangles(), arena.threads());

@@ -1,0 +1,19 @@
+// Smoke runs (LUMICUT_BENCH_SMOKE set, by CTest): every part of a benchmark on input that takes about a second in all, so
+// that none breaks unseen. Their figures mean nothing.
+#pragma once
+
+#include <cstdlib>
+
+namespace lumicut::bench {
+
+inline bool smoke() {
+  static const bool on = std::getenv("LUMICUT_BENCH_SMOKE") != nullptr;
+  return on;
+}
+
+template <typename T>
+T sized(T whole, T in_smoke) {
+  return smoke() ? in_smoke : whole;
+}
+
+}  // namespace lumicut::bench
