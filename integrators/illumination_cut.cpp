@@ -600,7 +600,8 @@ class IlluminationCut final : public Integrator {
 
 std::vector<ParamInfo> params() {
   return {
-      {"error", "Error", "Largest error of each pair of clusters, as a share of its darkest point's radiance",
+      {"error", "Error",
+       "Bounds each pair of clusters, as a share of its darkest point's radiance; it is no bound of the pixel's error",
        "of the radiance", ParamType::real, "0.02", 0, 1},
       {"visibility", "Visibility",
        "full: every shadow ray; sampling: few rays a pair, more where they disagree; unbiased: as sampling, with "
@@ -625,7 +626,7 @@ extern const IntegratorEntry illumination_cut_integrator;
 const IntegratorEntry illumination_cut_integrator = {
     "illumination_cut",
     "IlluminationCut",
-    "Clusters points and lights together, and traces few shadow rays: the fastest for images",
+    "Clusters points and lights together, with an error bound for each pair: for whole frames",
     "Bus, Mustafa and Biri 2015",
     params,
     []() -> std::unique_ptr<Integrator> { return std::make_unique<IlluminationCut>(); }};

@@ -23,6 +23,7 @@ struct ParamInfo {
   const char* default_text;
   double minimum = 0, maximum = 0;  // of numbers
   const char* choices = "";         // "a|b|c"
+  bool of_virtual_lights = false;   // without effect on a method that uses none
 };
 
 // Values of one integrator's parameters, checked against its table.
@@ -38,9 +39,10 @@ class Params {
   int64_t integer(const std::string& name) const { return static_cast<int64_t>(real(name)); }
   bool boolean(const std::string& name) const { return real(name) != 0; }
   const std::string& choice(const std::string& name) const;
+  // nullptr: no such parameter.
+  const ParamInfo* find(const std::string& name) const;
 
  private:
-  const ParamInfo* find(const std::string& name) const;
   std::vector<ParamInfo> table_;
   std::map<std::string, std::string> values_;
 };
@@ -93,10 +95,13 @@ struct IntegratorEntry {
 // Of all integrators, in the order of integrator_list.inc.
 std::span<const IntegratorEntry> integrators();
 const IntegratorEntry* find_integrator(const std::string& id);
-// common_params() and the integrator's own.
+// What the integrator accepts: common_params() and its own.
 std::vector<ParamInfo> all_params(const IntegratorEntry& entry);
+// Those of all_params() that have an effect on it: what hosts show.
+std::vector<ParamInfo> effective_params(const IntegratorEntry& entry);
 
-// vpls, seed, max_depth, direct_share, clamp_relative, clamp_distance and such: what every method understands.
+// vpls, seed, max_depth, direct_share, clamp_relative, clamp_distance and such: what every method accepts, so that a
+// host may set them whatever the method.
 std::vector<ParamInfo> common_params();
 
 // Distance below which no light comes nearer, in scene units: clamp_distance, or clamp_relative of the scene's radius.

@@ -12,8 +12,7 @@ namespace lumicut {
 
 namespace {
 
-// Share of the `error` parameter that one cluster may use, so that the mean error of an image stays below the
-// parameter.
+// Share of the `error` parameter that bounds one cluster. docs/integrators/README.md compares it with other methods.
 constexpr float kClusterShare = 0.75f;
 
 class Lightcuts final : public Integrator {
@@ -70,7 +69,9 @@ class Lightcuts final : public Integrator {
 
 std::vector<ParamInfo> params() {
   return {
-      {"error", "Error", "Error to stay under, as a share of the point's radiance; bounds each cluster",
+      {"error", "Error",
+       "Three quarters of it bound each cluster, as a share of the point's radiance; it is no bound of the pixel's "
+       "error",
        "of the radiance", ParamType::real, "0.02", 0, 1},
       {"max_cut", "Largest cut", "Most clusters a point may use; 0: no limit", "clusters", ParamType::integer, "0", 0,
        1e9},
@@ -78,7 +79,8 @@ std::vector<ParamInfo> params() {
        "Choices of representative lights that blocks of points draw from: 1 gives the smoothest image, more turn "
        "banding into noise",
        "", ParamType::integer, "1", 1, 64},
-      {"tree", "Light tree", "How the lights are clustered: agglomerative is best, the others are baselines", "",
+      {"tree", "Light tree",
+       "How the lights are clustered: agglomerative makes the smallest cuts, the others are baselines", "",
        ParamType::choice, "agglomerative", 0, 0, "agglomerative|divisive_3d|divisive_6d"},
   };
 }
@@ -89,7 +91,7 @@ extern const IntegratorEntry lightcuts_integrator;
 const IntegratorEntry lightcuts_integrator = {
     "lightcuts",
     "Lightcuts",
-    "A cut through the light tree for each point, with a bounded error",
+    "A cut through the light tree for each point, with an error bound for each cluster",
     "Walter et al. 2005; Walter et al. 2008, sec. 5",
     params,
     []() -> std::unique_ptr<Integrator> { return std::make_unique<Lightcuts>(); }};

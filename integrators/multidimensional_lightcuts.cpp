@@ -302,7 +302,8 @@ class MultidimensionalLightcuts final : public Integrator {
 
 std::vector<ParamInfo> params() {
   return {
-      {"error", "Error", "Largest error of each pair of clusters, as a share of the pixel's radiance",
+      {"error", "Error",
+       "Bounds each pair of clusters, as a share of the pixel's radiance; it is no bound of the pixel's error",
        "of the radiance", ParamType::real, "0.02", 0, 1},
       {"max_cut", "Largest cut", "Most pairs a pixel may use; 0: no limit", "clusters", ParamType::integer, "0", 0,
        1e9},
@@ -315,7 +316,7 @@ extern const IntegratorEntry multidimensional_lightcuts_integrator;
 const IntegratorEntry multidimensional_lightcuts_integrator = {
     "multidimensional_lightcuts",
     "Multidimensional lightcuts",
-    "One cut for all samples of a pixel, with a bounded error: depth of field and antialiasing at little cost",
+    "One cut for all samples of a pixel, with an error bound for each pair: for many samples a pixel",
     "Walter et al. 2006",
     params,
     []() -> std::unique_ptr<Integrator> { return std::make_unique<MultidimensionalLightcuts>(); }};

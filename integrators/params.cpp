@@ -89,34 +89,33 @@ const std::string& Params::choice(const std::string& name) const {
 std::vector<ParamInfo> common_params() {
   return {
       {"vpls", "Virtual lights", "How many virtual point lights stand for the scene's light", "lights",
-       ParamType::integer, "60000", 1, 1e8},
+       ParamType::integer, "60000", 1, 1e8, "", true},
       {"seed", "Seed", "Same seed, same image", "", ParamType::integer, "1", 0, 4294967295.0},
       {"max_depth", "Bounces", "Surfaces that a light path may meet; 0: direct light alone", "", ParamType::integer,
        "32", 0, 1024},
       {"direct_share", "Direct share",
        "Share of the virtual lights that is spent on the direct light of extended lamps", "", ParamType::real, "0.25",
-       0.01, 1},
+       0.01, 1, "", true},
       {"environment_vpls", "Environment lights",
        "How many of the virtual lights stand for the environment; 0: its share of the power among those for direct "
        "light",
-       "lights", ParamType::integer, "0", 0, 1e8},
+       "lights", ParamType::integer, "0", 0, 1e8, "", true},
       {"clamp_relative", "Clamp (relative)",
        "No virtual light is taken to be nearer than this share of the scene's radius", "of the scene's radius",
-       ParamType::real, "0.05", 0, 1},
+       ParamType::real, "0.05", 0, 1, "", true},
       {"clamp_distance", "Clamp distance",
        "No virtual light is taken to be nearer than this; 0: use the relative clamp", "scene units", ParamType::real,
-       "0", 0, 1e30},
+       "0", 0, 1e30, "", true},
       {"virtual_lights", "Virtual lights are",
        "points, which leave bright dots on glossy surfaces and in corners; or spheres as wide as they lie apart: no "
        "dots and nothing clamped, at the price of a slight blur and slower shading",
-       "", ParamType::choice, "points", 0, 0, "points|spheres"},
+       "", ParamType::choice, "points", 0, 0, "points|spheres", true},
       {"sphere_scale", "Sphere size", "Radius of the spheres", "of the distance to the tenth nearest", ParamType::real,
-       "1", 0.001, 10},
+       "1", 0.001, 10, "", true},
       {"compensate", "Compensate",
        "Rays bring back the light that the clamp takes away, and what glossy surfaces throw on others: no energy is "
-       "lost, "
-       "at the price of noise that passes average out",
-       "", ParamType::boolean, "0"},
+       "lost, at the price of noise that passes average out",
+       "", ParamType::boolean, "0", 0, 0, "", true},
   };
 }
 

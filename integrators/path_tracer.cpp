@@ -1,4 +1,4 @@
-// Paths from the eye, with a light sampled at every surface: the truth that virtual lights are measured against.
+// Paths from the eye, with a light sampled at every surface: the reference that virtual lights are measured against.
 // [Kajiya 1986; multiple importance sampling: Veach, Guibas 1995]
 #include <numbers>
 
@@ -240,9 +240,7 @@ extern const IntegratorEntry path_tracer_integrator;
 const IntegratorEntry path_tracer_integrator = {
     "path_tracer",
     "Path tracer",
-    "Traces paths from the eye: noise in place of bias, and the truth for all other methods; virtual lights and the "
-    "clamp "
-    "mean nothing to it",
+    "Traces paths from the eye: noise in place of bias, no virtual lights and no clamp; the reference of all methods",
     "Kajiya 1986; Veach, Guibas 1995",
     [] {
       return std::vector<ParamInfo>{

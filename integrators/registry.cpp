@@ -35,4 +35,11 @@ std::vector<ParamInfo> all_params(const IntegratorEntry& entry) {
   return table;
 }
 
+std::vector<ParamInfo> effective_params(const IntegratorEntry& entry) {
+  std::vector<ParamInfo> table = all_params(entry);
+  if (entry.light_source == LightSource::emitters)
+    std::erase_if(table, [](const ParamInfo& p) { return p.of_virtual_lights; });
+  return table;
+}
+
 }  // namespace lumicut

@@ -255,7 +255,7 @@ extern const IntegratorEntry stochastic_lightcuts_integrator;
 const IntegratorEntry stochastic_lightcuts_integrator = {
     "stochastic_lightcuts",
     "Stochastic lightcuts",
-    "A cut of fixed size for each point, and a random light of each of its clusters: unbiased, for denoising",
+    "A cut of fixed size for each point, and a random light of each of its clusters: unbiased, with noise",
     "Yuksel 2019",
     params,
     []() -> std::unique_ptr<Integrator> { return std::make_unique<StochasticLightcuts>(); }};

@@ -427,7 +427,7 @@ std::vector<ParamInfo> params() {
 extern const IntegratorEntry wspd_integrator;
 const IntegratorEntry wspd_integrator = {"wspd",
                                          "Well-separated pairs",
-                                         "Clusterings made once for all views: for many cameras in one scene",
+                                         "Clusterings made once for all views, which may be saved; no error bound",
                                          "Bus, Mustafa and Biri 2015; thesis ch. 2",
                                          params,
                                          []() -> std::unique_ptr<Integrator> { return std::make_unique<Wspd>(); }};

@@ -45,7 +45,7 @@ lumicut_result lumicut_get_integrator_info(uint32_t index, lumicut_integrator_in
                     " is out of range: there are " + number_text(uint64_t{all.size()}) + " integrators");
     const IntegratorEntry& e = all[index];
     lumicut_integrator_info out{};
-    out.param_count = static_cast<uint32_t>(all_params(e).size());
+    out.param_count = static_cast<uint32_t>(effective_params(e).size());
     out.id = e.id, out.label = e.label, out.description = e.description, out.source = e.source;
     write(info, out);
   });
@@ -54,7 +54,7 @@ lumicut_result lumicut_get_integrator_info(uint32_t index, lumicut_integrator_in
 lumicut_result lumicut_get_param_info(const char* integrator, uint32_t index, lumicut_param_info* info) {
   return guard([&] {
     const IntegratorEntry& e = entry_named(integrator);
-    const std::vector<ParamInfo> params = all_params(e);
+    const std::vector<ParamInfo> params = effective_params(e);
     if (index >= params.size())
       fail_argument("lumicut_get_param_info: index " + number_text(uint64_t{index}) + " is out of range: " + e.id +
                     " has " + number_text(uint64_t{params.size()}) + " parameters");
@@ -83,6 +83,9 @@ lumicut_result lumicut_integrator_set(lumicut_integrator integrator, const char*
     if (name == nullptr || value == nullptr) fail_argument("lumicut_integrator_set: name or value is NULL");
     const Gate::Hold hold = i.gate.change("lumicut_integrator_set");
     i.params.set(name, value);
+    if (i.entry.light_source == LightSource::emitters && i.params.find(name)->of_virtual_lights)
+      i.device->log(LogLevel::warning,
+                    std::string("parameter ") + name + " has no effect: " + i.entry.id + " has no virtual lights");
   });
 }
 

@@ -126,7 +126,7 @@ class LUMICUT_PT_integrator(Panel, bpy.types.Panel):
         layout.use_property_decorate = False
         layout.prop(settings, "integrator")
         column = layout.column(align=True)
-        for p in properties.tables.group(settings.integrator):
+        for p in properties.tables.own_of(settings.integrator):
             column.prop(getattr(settings, settings.integrator), p["id"])
         layout.prop(settings, "samples")
         column = layout.column(align=True)
@@ -147,7 +147,7 @@ class LUMICUT_PT_lights(Panel, bpy.types.Panel):
         layout.use_property_decorate = False
         column = layout.column(align=True)
         settings = context.scene.lumicut
-        for p in properties.tables.group(properties.COMMON):
+        for p in properties.tables.common_of(settings.integrator):
             column.prop(getattr(settings, properties.COMMON), p["id"])
         layout.prop(settings, "max_shininess")
         layout.prop(settings, "viewport_lights")

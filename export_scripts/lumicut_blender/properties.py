@@ -5,7 +5,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, Po
 
 from . import library, runtime
 
-COMMON = "common"  # the group of parameters that all integrators share
+COMMON = "common"  # the group of parameters that nearly all integrators share
 ACCELS = [
     ("agglomerative", "Agglomerative BVH", "The library's own tree: shares nothing with the host"),
     ("embree", "Embree", "Intel's tree. On Blender from blender.org, which carries an Embree of its own, the two may clash"),
@@ -26,7 +26,7 @@ PRESETS = {
     # name: (label, tooltip, own settings, integrator, parameters of whatever group has them)
     "draft": ("Draft", "A first look: one sample, few lights, wide bounds",
               {"samples": 1}, "illumination_cut", {"vpls": 10000, "error": 0.05}),
-    "good": ("Good", "For most images: antialiased, 60,000 lights, error about 2 %",
+    "good": ("Good", "For most images: antialiased, 60,000 lights, bounds of 2 %",
              {"samples": 9}, "illumination_cut", {"vpls": 60000, "error": 0.02}),
     "reference": ("Reference", "256 passes that each sum all of 4,000 lights anew, with what the clamp takes brought back: slow, and as path traced: corners, gloss and glass too",
                   {"samples": 1, "passes": 256}, "exhaustive", {"vpls": 4000, "compensate": True}),
@@ -61,25 +61,27 @@ def text_of(value):
 
 
 class Tables:
-    """The parameter tables, parted into what all integrators share and what each has alone."""
+    """The parameter tables, parted into what nearly all integrators share and what each has alone."""
 
     def __init__(self, integrators):
         self.integrators = integrators
-        ids = [{p["id"] for p in parameters} for *_, parameters in integrators]
-        self.common_ids = set.intersection(*ids) if ids else set()
+        self.of = {identifier: parameters for identifier, *_, parameters in integrators}
+        self.ids = {identifier: {p["id"] for p in parameters} for identifier, parameters in self.of.items()}
+        first = integrators[0][4] if integrators else []
+        # Shared by more than half: a path tracer has no virtual lights, so their parameters are not its own.
+        self.common = [p for p in first if 2 * sum(p["id"] in ids for ids in self.ids.values()) > len(self.ids)]
+        self.common_ids = {p["id"] for p in self.common}
 
     def groups(self):
         """[(group, [parameters])]; the common ones first."""
-        if not self.integrators:
-            return []
-        first = self.integrators[0][4]
-        result = [(COMMON, [p for p in first if p["id"] in self.common_ids])]
-        for identifier, *_, parameters in self.integrators:
-            result.append((identifier, [p for p in parameters if p["id"] not in self.common_ids]))
-        return result
+        return [(COMMON, self.common)] * bool(self.integrators) + [(name, self.own_of(name)) for name in self.of]
 
-    def group(self, name):
-        return dict(self.groups()).get(name, [])
+    def own_of(self, integrator):
+        return [p for p in self.of.get(integrator, []) if p["id"] not in self.common_ids]
+
+    def common_of(self, integrator):
+        """Of the common parameters those that the integrator has."""
+        return [p for p in self.common if p["id"] in self.ids.get(integrator, ())]
 
 
 tables = Tables([])
@@ -93,14 +95,12 @@ class LumicutViewLayerSettings(bpy.types.PropertyGroup):
 def parameters_of(settings, integrator=None):
     """{name: text} of an integrator's parameters as the scene has them."""
     integrator = integrator or settings.integrator
-    result = {}
-    for group, parameters in tables.groups():
-        if group not in {COMMON, integrator}:
-            continue
-        values = getattr(settings, group)
-        for p in parameters:
-            result[p["id"]] = text_of(getattr(values, p["id"]))
-    return result
+    own = {p["id"]: text_of(getattr(getattr(settings, integrator), p["id"])) for p in tables.own_of(integrator)}
+    return common_parameters_of(settings, integrator) | own
+
+
+def common_parameters_of(settings, integrator):
+    return {p["id"]: text_of(getattr(getattr(settings, COMMON), p["id"])) for p in tables.common_of(integrator)}
 
 
 def apply_preset(settings, name):

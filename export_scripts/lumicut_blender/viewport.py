@@ -72,11 +72,14 @@ class Session:
 
     @staticmethod
     def _settings(settings):
-        parameters = properties.parameters_of(settings)
-        parameters["vpls"] = str(settings.viewport_lights)
-        common = {p["id"] for p in properties.tables.group(properties.COMMON)}
-        return {"integrator": settings.integrator, "parameters": parameters, "accel": settings.accel,
-                "threads": settings.threads, "common": {k: v for k, v in parameters.items() if k in common}}
+        chosen = settings.integrator
+        names = {chosen} | {name for _, name, _ in LEVELS if name in properties.tables.ids}
+        parameters = {name: (properties.parameters_of if name == chosen else properties.common_parameters_of)(settings, name)
+                      for name in names}
+        for values in parameters.values():
+            if "vpls" in values:
+                values["vpls"] = str(settings.viewport_lights)
+        return {"integrator": chosen, "parameters": parameters, "accel": settings.accel, "threads": settings.threads}
 
     def draw(self, engine, context, depsgraph):
         region = context.region
@@ -191,15 +194,13 @@ class Session:
             raise library.Cancelled(library.CANCELLED, "a newer view waits")
 
     def _render_levels(self, device, scene, integrators, size, settings):
-        known = {row[0] for row in properties.tables.integrators}
         for number, (divisor, name, extra) in enumerate(LEVELS):
-            if name not in known:
+            if name not in settings["parameters"]:
                 name, extra = settings["integrator"], {}
             key = (name, number if extra else None)
             if key not in integrators:
                 integrator = library.Integrator(device, name)
-                wanted = settings["parameters"] if name == settings["integrator"] else settings["common"]
-                for parameter, value in (wanted | extra).items():
+                for parameter, value in (settings["parameters"][name] | extra).items():
                     integrator.set(parameter, value)
                 integrators[key] = integrator
             width, height = max(1, size[0] // divisor), max(1, size[1] // divisor)

@@ -93,6 +93,13 @@ class Tables(unittest.TestCase):
                 self.assertGreater(h.radiance(h.render()).mean(), 0.01)
                 self.assertEqual(h.last_stats()["integrator"], identifier)
 
+    def test_an_integrator_gets_the_parameters_that_it_lists(self):
+        settings = bpy.context.scene.lumicut
+        for identifier, _, _, _, parameters in runtime.require().integrators():
+            self.assertEqual(set(properties.parameters_of(settings, identifier)), {p["id"] for p in parameters}, identifier)
+        self.assertNotIn("vpls", properties.parameters_of(settings, "path_tracer"))
+        self.assertIn("vpls", {p["id"] for p in properties.tables.common})
+
     def test_presets_set_what_they_promise(self):
         settings = bpy.context.scene.lumicut
         for name, (_, _, own, integrator, values) in properties.PRESETS.items():

@@ -45,6 +45,46 @@ TEST(Integrators, TellTheirParametersAndTakeTheirDefaults) {
   EXPECT_CODE(lumicut_integrator_create(device.get(), "no_such", &none), LUMICUT_INVALID_ARGUMENT, "exhaustive");
 }
 
+// Hosts may set the parameters of virtual lights on any integrator. One without such lights does not list them, warns,
+// and renders the same.
+TEST(Integrators, ThePathTracerListsWhatItUsesAndIgnoresWhatVirtualLightsNeed) {
+  std::set<std::string> listed;
+  auto p = make<lumicut_param_info>();
+  for (uint32_t n = 0; lumicut_get_param_info("path_tracer", n, &p) == LUMICUT_OK; ++n) listed.insert(p.id);
+  EXPECT_EQ(listed, (std::set<std::string>{"seed", "max_depth", "samples"}));
+
+  std::string warnings;
+  const auto log = [](void* user, int32_t, const char* text) { *static_cast<std::string*>(user) += text; };
+  const api::Device device(1, log, &warnings, 1);
+  const api::Scene s = scene(device);
+  const auto image = [&](const api::Integrator& i) {
+    auto f = make<lumicut_render_desc>();
+    f.width = 16, f.height = 12;
+    const api::Render r(i, s, f);
+    r.wait();
+    return r.read("radiance");
+  };
+  const auto plain = image(api::Integrator(device, "path_tracer").set("samples", "4"));
+  EXPECT_EQ(warnings, "");
+  api::Integrator i(device, "path_tracer");
+  i.set("samples", "4").set("max_depth", "32");
+  for (const auto& [name, value] : {std::pair{"vpls", "5"},
+                                    {"direct_share", "1"},
+                                    {"environment_vpls", "3"},
+                                    {"clamp_relative", "0.9"},
+                                    {"clamp_distance", "2"},
+                                    {"virtual_lights", "spheres"},
+                                    {"sphere_scale", "3"},
+                                    {"compensate", "true"}}) {
+    warnings.clear();
+    i.set(name, value);
+    EXPECT_EQ(warnings, std::string("parameter ") + name + " has no effect: path_tracer has no virtual lights");
+    EXPECT_EQ(image(i), plain) << name;
+  }
+  EXPECT_CODE(lumicut_integrator_set(i.get(), "vpls", "0"), LUMICUT_INVALID_ARGUMENT, "vpls: 0 is not in");
+  EXPECT_CODE(lumicut_integrator_set(i.get(), "error", "0.1"), LUMICUT_INVALID_ARGUMENT, "no parameter \"error\"");
+}
+
 TEST(Integrators, LightsThatGoOutComeInAgainUnchanged) {
   const api::Device device(2);
   const api::Scene s = scene(device);

@@ -25,6 +25,8 @@ class Info(Cli):
         self.assertIn("exhaustive", integrators)
         self.assertIn("lightcuts", integrators)
         self.assertIn("error", integrators["lightcuts"])
+        tracer = integrators.pop("path_tracer")
+        self.assertEqual(tracer, {"seed", "max_depth", "samples"}, "what virtual lights need has no effect on it")
         for parameters in integrators.values():
             self.assertLessEqual({"vpls", "seed", "clamp_distance"}, parameters)
         self.assertIn("radiance", [c["name"] for c in info["channels"]])
