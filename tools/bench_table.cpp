@@ -109,6 +109,7 @@ constexpr Line kLines[] = {
     {"Rel. error (%)", "mean_relative_error", 100, "{:.3f}"},
     {"Rel. error p95 (%)", "p95_relative_error", 100, "{:.2f}"},
     {"Rel. error p99 (%)", "p99_relative_error", 100, "{:.2f}"},
+    {"Rel. error max (%)", "max_relative_error", 100, "{:.1f}"},
     {"Peak memory (MB)", "peak_bytes", 1e-6, "{:.0f}"},
     {"Speed-up on exhaustive", "speedup/render_on_exhaustive", 1, "{:.1f}"},
     {"  with preprocessing", "speedup/total_on_exhaustive", 1, "{:.1f}"},

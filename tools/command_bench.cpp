@@ -94,6 +94,7 @@ void set_errors(ordered_json& row, const Metrics& m) {
   row["mean_relative_error"] = m.mean_relative_error;
   row["p95_relative_error"] = m.p95_relative_error;
   row["p99_relative_error"] = m.p99_relative_error;
+  row["max_relative_error"] = m.max_relative_error;
   row["mrse"] = m.mrse;
   row["bias"] = m.bias;
   row["compared_pixels"] = m.pixels;

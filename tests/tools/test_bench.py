@@ -48,7 +48,7 @@ class Results(Bench):
             for key in ("scene", "integrator", "parameters", "seed", "vpls", "width", "height", "samples", "threads", "accel",
                         "version", "git", "preprocess_seconds", "render_seconds", "total_seconds", "amortised_seconds",
                         "rays_per_pixel", "bounds_per_pixel", "clusters_per_pixel", "rmse", "lmse", "mean_relative_error",
-                        "p95_relative_error", "p99_relative_error", "peak_bytes", "command", "triangles"):
+                        "p95_relative_error", "p99_relative_error", "max_relative_error", "peak_bytes", "command", "triangles"):
                 self.assertIn(key, row)
             for key in ("render_on_exhaustive", "total_on_exhaustive", "render_on_baseline", "total_on_baseline"):
                 self.assertGreater(row["speedup"][key], 0)
