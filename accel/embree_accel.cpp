@@ -1,9 +1,15 @@
 #include "accel/embree_accel.h"
 
+#include <tbb/task_arena.h>
+
 #include <atomic>
 #include <chrono>
+#include <cstdio>
 #include <cstring>
+#include <exception>
 #include <mutex>
+#include <new>
+#include <thread>
 
 #include "accel/embree_api.h"
 #include "accel/validate.h"
@@ -17,11 +23,12 @@ static_assert(sizeof(Ray) == sizeof(RTCRay) && offsetof(Ray, tfar) == offsetof(R
 static_assert(sizeof(Hit) <= sizeof(RTCHit) && offsetof(Hit, inst) == offsetof(RTCHit, instID));
 static_assert(offsetof(RayHit, hit) == offsetof(RTCRayHit, hit));
 
-// What Embree reports while it builds, from any of its threads.
+// What Embree reports while it builds, from any of its threads. It may report that memory is out: nothing here
+// allocates.
 struct DeviceState {
   std::mutex mutex;
   RTCError code = RTC_ERROR_NONE;
-  std::string text;
+  char text[256] = "";
   std::atomic<int64_t> bytes{0};
   Progress* progress = nullptr;
 };
@@ -31,7 +38,7 @@ void on_error(void* user, RTCError code, const char* text) {
   const std::lock_guard lock(state.mutex);
   if (state.code != RTC_ERROR_NONE) return;
   state.code = code;
-  state.text = text != nullptr ? text : "";
+  std::snprintf(state.text, sizeof(state.text), "%s", text != nullptr ? text : "");
 }
 
 bool on_memory(void* user, ssize_t bytes, bool) {
@@ -61,18 +68,34 @@ void on_filter(const RTCFilterFunctionNArguments* args) {
   }
 }
 
+// Each thread that builds has an allocator, which Embree binds to the scene's. Where memory runs out while it does that,
+// it stays bound to one that is then freed, and the thread's next build writes there. So once memory ran out, each build
+// has a thread of its own, alone.
+std::atomic<bool> threads_spoiled{false};
+
 class EmbreeAccel final : public Accel {
  public:
   EmbreeAccel(const AccelGeometry& geometry, const AccelOptions& options, Progress* progress) {
     const auto start = std::chrono::steady_clock::now();
     state_.progress = progress;
-    // No threads of Embree's own: the build joins the caller's arena.
-    device_ = rtcNewDevice("start_threads=0,set_affinity=0");
-    if (device_ == nullptr) throw Error(ErrorCode::internal, "embree: no device can be made here");
+    // No threads of Embree's own: the build joins the caller's arena. No cache of tessellated surfaces, of which there
+    // are none: where there is no memory for it, Embree keeps a lock for ever that its next device waits for.
+    device_ = rtcNewDevice("start_threads=0,set_affinity=0,tessellation_cache_size=0");
+    if (device_ == nullptr) {
+      if (rtcGetDeviceError(nullptr) == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
+      throw Error(ErrorCode::internal, "embree: no device can be made here");
+    }
     rtcSetDeviceErrorFunction(device_, on_error, &state_);
     rtcSetDeviceMemoryMonitorFunction(device_, on_memory, &state_);
     try {
-      build(geometry, options);
+      if (threads_spoiled)
+        build_apart(geometry, options);
+      else
+        build(geometry, options);
+    } catch (const std::bad_alloc&) {
+      threads_spoiled = true;
+      release();
+      throw;
     } catch (...) {
       release();
       throw;
@@ -168,11 +191,12 @@ class EmbreeAccel final : public Accel {
   void check() const {
     if (state_.code == RTC_ERROR_NONE) return;
     if (state_.code == RTC_ERROR_CANCELLED) throw Error(ErrorCode::cancelled, "cancelled");
-    const bool memory = state_.code == RTC_ERROR_OUT_OF_MEMORY;
-    throw Error(memory ? ErrorCode::out_of_memory : ErrorCode::internal, "embree: " + state_.text);
+    if (state_.code == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
+    throw Error(ErrorCode::internal, std::string("embree: ") + state_.text);
   }
 
   RTCScene new_scene(const AccelOptions& options) {
+    scenes_.reserve(scenes_.size() + 1);
     const RTCScene scene = rtcNewScene(device_);
     check();
     scenes_.push_back(scene);
@@ -253,6 +277,18 @@ class EmbreeAccel final : public Accel {
       info_.bounds.hi = {bounds.upper_x, bounds.upper_y, bounds.upper_z};
     }
     info_.bytes = static_cast<uint64_t>(std::max<int64_t>(0, state_.bytes.load()));
+  }
+
+  void build_apart(const AccelGeometry& geometry, const AccelOptions& options) {
+    std::exception_ptr failure;
+    std::thread([&] {
+      try {
+        tbb::task_arena(1).execute([&] { build(geometry, options); });
+      } catch (...) {
+        failure = std::current_exception();
+      }
+    }).join();
+    if (failure) std::rethrow_exception(failure);
   }
 
   void release() {

@@ -1,5 +1,7 @@
 #include "core/stats.h"
 
+#include <new>
+
 namespace lumicut {
 
 namespace {
@@ -16,9 +18,13 @@ void Stats::add(const Counters& c) {
   const std::lock_guard lock(mutex_);
   counters_ += c;
 }
+// Timers call it as they end, also while memory is out: a phase that there is no room for is left out.
 void Stats::add_phase(const std::string& name, double seconds) {
   const std::lock_guard lock(mutex_);
-  entry(phases_, name) += seconds;
+  try {
+    entry(phases_, name) += seconds;
+  } catch (const std::bad_alloc&) {
+  }
 }
 void Stats::set_value(const std::string& name, double value) {
   const std::lock_guard lock(mutex_);

@@ -28,7 +28,8 @@ Film::Film(Rect crop, std::vector<uint32_t> groups) : crop_(crop), groups_(std::
   const size_t pixels = size_t{crop.width()} * crop.height();
   for (const ChannelInfo& c : channel_table())
     planes_[static_cast<size_t>(c.channel)].assign(pixels * c.components, 0.0f);
-  group_planes_.assign(groups_.size(), std::vector<float>(3 * pixels, 0.0f));
+  group_planes_.resize(groups_.size());
+  for (std::vector<float>& plane : group_planes_) plane.assign(3 * pixels, 0.0f);
 }
 
 template <typename Planes, typename Groups, typename Fn>

@@ -36,6 +36,11 @@ class PassMean {
     double radiance[3] = {};
     double mean = 0.0, squares = 0.0;  // of luminance; squares of distances from the mean [Welford 1962]
   };
+
+ public:
+  static constexpr size_t kBytes = sizeof(Sums);  // a pixel, also as saved
+
+ private:
   size_t index(uint32_t x, uint32_t y) const { return size_t{y - crop_.y0} * crop_.width() + (x - crop_.x0); }
 
   Rect crop_;

@@ -1,18 +1,53 @@
 #include "plugin/boundary.h"
 
+#include <pthread.h>
+
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <new>
 #include <stdexcept>
+#include <system_error>
 
 namespace lumicut {
 
 namespace {
-thread_local char error_text[1024] = "";
-}
 
-void set_last_error(const char* text) noexcept { std::snprintf(error_text, sizeof(error_text), "%s", text); }
-const char* last_error() noexcept { return error_text; }
+// Not thread_local: in a library that a host loads while it runs, the C library makes a thread's variables at their
+// first use, and aborts where memory is out.
+class ErrorTexts {
+ public:
+  ErrorTexts() : made_(pthread_key_create(&key_, [](void* text) { release(text); }) == 0) {}
+
+  void set(const char* text) noexcept {
+    if (!made_) return;
+    auto* mine = static_cast<char*>(pthread_getspecific(key_));
+    if (mine == nullptr || mine == kNoMemory) {
+      mine = static_cast<char*>(std::malloc(kBytes));
+      if (pthread_setspecific(key_, mine != nullptr ? mine : kNoMemory) != 0) release(mine), mine = nullptr;
+    }
+    if (mine != nullptr) std::snprintf(mine, kBytes, "%s", text);
+  }
+  const char* get() const noexcept {
+    const void* const mine = made_ ? pthread_getspecific(key_) : nullptr;
+    return mine != nullptr ? static_cast<const char*>(mine) : "";
+  }
+
+ private:
+  static constexpr size_t kBytes = 1024;
+  static inline char kNoMemory[] = "out of memory (there is none for the text of the error either)";
+  static void release(void* text) {
+    if (text != kNoMemory) std::free(text);
+  }
+
+  pthread_key_t key_{};
+  const bool made_;
+} error_texts;
+
+}  // namespace
+
+void set_last_error(const char* text) noexcept { error_texts.set(text); }
+const char* last_error() noexcept { return error_texts.get(); }
 
 lumicut_result report_exception() noexcept {
   try {
@@ -26,6 +61,11 @@ lumicut_result report_exception() noexcept {
   } catch (const std::length_error&) {  // a container's own limit
     set_last_error("out of memory: a count is beyond what any memory holds");
     return LUMICUT_OUT_OF_MEMORY;
+  } catch (const std::system_error& e) {  // of a thread that could not be started
+    set_last_error(e.what());
+    return e.code() == std::errc::resource_unavailable_try_again || e.code() == std::errc::not_enough_memory
+               ? LUMICUT_OUT_OF_MEMORY
+               : LUMICUT_INTERNAL;
   } catch (const std::exception& e) {
     set_last_error(e.what());
     return LUMICUT_INTERNAL;

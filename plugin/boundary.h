@@ -20,8 +20,7 @@ namespace lumicut {
 
 // ---- Errors --------------------------------------------------------------------------------------------------------
 
-// This thread's text. Kept in a plain buffer: setting it allocates nothing, and a thread that ends leaves nothing
-// behind.
+// This thread's text, freed when the thread ends. Where there is no memory for it, it says so.
 void set_last_error(const char* text) noexcept;
 const char* last_error() noexcept;
 

@@ -102,7 +102,10 @@ lumicut_result lumicut_accel_build(lumicut_device device, const lumicut_accel_de
         else
           made->accel = make_accel(kind, geometry, options);
       });
-      if (made->bvh != nullptr) made->positions = {}, made->indices = {};  // it keeps triangles of its own
+      if (made->bvh != nullptr) {  // it keeps triangles of its own
+        made->positions = std::vector<Vec3f>();
+        made->indices = std::vector<uint32_t>();
+      }
     }
     *accel = made.release();
   });

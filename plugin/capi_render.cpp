@@ -55,9 +55,9 @@ lumicut_result lumicut_render_start(lumicut_integrator integrator, lumicut_scene
 lumicut_result lumicut_render_wait(lumicut_render render, uint32_t milliseconds, lumicut_status* status) {
   return guard([&] {
     lumicut_render_t& r = object(render);
-    const auto error = r.wait(milliseconds);
+    const std::exception_ptr failure = r.wait(milliseconds);
     if (status != nullptr) write(status, r.status());
-    if (error) throw *error;
+    if (failure) std::rethrow_exception(failure);
   });
 }
 

@@ -82,15 +82,17 @@ lumicut_result lumicut_scene_update_mesh(lumicut_scene scene, uint32_t id, const
 
 lumicut_result lumicut_scene_set_profiles(lumicut_scene scene, const lumicut_profile* profiles, uint64_t count) {
   return change_scene(scene, "lumicut_scene_set_profiles", [&](lumicut_scene_t& s) {
-    s.profiles = convert_all<KeptProfile>(read_array(profiles, count), to_profile);
+    s.profiles = convert_all<ProfileRef>(read_array(profiles, count), to_profile);
   });
 }
 
 lumicut_result lumicut_scene_set_lights(lumicut_scene scene, const lumicut_light* lights, uint64_t count) {
   return change_scene(scene, "lumicut_scene_set_lights", [&](lumicut_scene_t& s) {
-    s.scene.set_lights(convert_all<Light>(read_array(lights, count), [&](const lumicut_light& light, uint64_t i) {
+    auto made = convert_all<Light>(read_array(lights, count), [&](const lumicut_light& light, uint64_t i) {
       return to_light(light, i, s.profiles);
-    }));
+    });
+    s.light_profiles = hold_profiles(made);
+    s.scene.set_lights(std::move(made));
     s.changed = true;
   });
 }

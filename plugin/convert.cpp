@@ -180,7 +180,7 @@ Mesh to_mesh(const lumicut_mesh& in) {
   return mesh;
 }
 
-KeptProfile to_profile(const lumicut_profile& in, uint64_t index) {
+ProfileRef to_profile(const lumicut_profile& in, uint64_t index) {
   const Checked c("lumicut_profile", index);
   c.integer("vertical_count", in.vertical_count, 2, 65536);
   c.integer("horizontal_count", in.horizontal_count, 1, 65536);
@@ -190,10 +190,9 @@ KeptProfile to_profile(const lumicut_profile& in, uint64_t index) {
     return std::vector<float>(values, values + count);
   };
   try {
-    const LightProfile profile(copied("vertical", in.vertical, in.vertical_count),
-                               copied("horizontal", in.horizontal, in.horizontal_count),
-                               copied("values", in.values, size_t{in.vertical_count} * in.horizontal_count));
-    return {keep_profile(profile), profile.largest()};
+    return keep_profile({copied("vertical", in.vertical, in.vertical_count),
+                         copied("horizontal", in.horizontal, in.horizontal_count),
+                         copied("values", in.values, size_t{in.vertical_count} * in.horizontal_count)});
   } catch (const Error& error) {
     const std::string text = error.what();
     if (text.rfind("lumicut_profile", 0) == 0) throw;
@@ -201,7 +200,7 @@ KeptProfile to_profile(const lumicut_profile& in, uint64_t index) {
   }
 }
 
-Light to_light(const lumicut_light& in, uint64_t index, const std::vector<KeptProfile>& profiles) {
+Light to_light(const lumicut_light& in, uint64_t index, const std::vector<ProfileRef>& profiles) {
   const Checked c("lumicut_light", index);
   c.integer("type", in.type, LUMICUT_POINT, LUMICUT_SUN);
   c.integer("unit", in.unit, LUMICUT_RADIOMETRIC, LUMICUT_WATT);
@@ -239,8 +238,8 @@ Light to_light(const lumicut_light& in, uint64_t index, const std::vector<KeptPr
     if (in.profile > profiles.size())
       c.fail("profile", number_text(uint64_t{in.profile}) + " is out of range: the scene has " +
                             number_text(uint64_t{profiles.size()}) + " profiles");
-    light.profile = profiles[in.profile - 1].id;
-    scale *= profiles[in.profile - 1].largest;
+    light.profile = profiles[in.profile - 1]->id();
+    scale *= profiles[in.profile - 1]->largest();
     light.direction = c.direction("direction", in.direction);
     c.finite("tangent", in.tangent);
     const Vec3f given = vec(in.tangent);
@@ -473,14 +472,6 @@ FrameOptions to_frame_options(const lumicut_render_desc& in) {
     c.fail("crop", text + " is not a rectangle x0, y0, x1, y1 inside " + number_text(uint64_t{in.width}) + " x " +
                        number_text(uint64_t{in.height}));
   }
-  double components = 0;
-  for (const ChannelInfo& channel : channel_table()) components += channel.components;
-  const double bytes = components * sizeof(float) * o.crop.width() * o.crop.height();
-  const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
-  if (memory > 0 && bytes > memory)
-    throw Error(ErrorCode::out_of_memory, "lumicut_render_desc: a film of " + number_text(uint64_t{o.crop.width()}) +
-                                              " x " + number_text(uint64_t{o.crop.height()}) + " pixels needs " +
-                                              number_text(std::round(bytes / 1e9)) + " GB, more than the machine has");
   return o;
 }
 
@@ -504,6 +495,15 @@ PassOptions to_pass_options(const lumicut_render_desc& in) {
     o.resume.assign(bytes, bytes + in.checkpoint_size);
   }
   return o;
+}
+
+void check_render_bytes(const Rect& crop, uint64_t bytes) {
+  const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  if (memory > 0 && static_cast<double>(bytes) > memory)
+    throw Error(ErrorCode::out_of_memory, "lumicut_render_desc: a render of " + number_text(uint64_t{crop.width()}) +
+                                              " x " + number_text(uint64_t{crop.height()}) + " pixels needs " +
+                                              number_text(std::round(static_cast<double>(bytes) / 1e9)) +
+                                              " GB, more than the machine has");
 }
 
 }  // namespace lumicut

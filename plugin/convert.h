@@ -9,21 +9,16 @@
 #include "plugin/boundary.h"
 #include "plugin/passes.h"
 #include "scene/scene.h"
+#include "vpl/light_profile.h"
 #include "vpl/vpl.h"
 
 namespace lumicut {
 
-// A profile kept [vpl/light_profile.h], and its largest value.
-struct KeptProfile {
-  uint32_t id = 0;
-  float largest = 0.0f;
-};
-
 Texture to_texture(const lumicut_texture& in, uint64_t index);
 Material to_material(const lumicut_material& in, uint64_t index);
 Mesh to_mesh(const lumicut_mesh& in);
-Light to_light(const lumicut_light& in, uint64_t index, const std::vector<KeptProfile>& profiles);
-KeptProfile to_profile(const lumicut_profile& in, uint64_t index);
+Light to_light(const lumicut_light& in, uint64_t index, const std::vector<ProfileRef>& profiles);
+ProfileRef to_profile(const lumicut_profile& in, uint64_t index);
 Environment to_environment(const lumicut_environment& in);
 Camera to_camera(const lumicut_camera& in);
 
@@ -41,8 +36,10 @@ std::vector<uint64_t> append_points(const Scene& scene, const lumicut_point* poi
                                     ShadePoints& out);
 void check_points(const Scene& scene, const lumicut_point* points, uint64_t count);
 
-// Size, crop, samples and tiles. Fails where the film is larger than the machine's memory.
+// Size, crop, samples and tiles.
 FrameOptions to_frame_options(const lumicut_render_desc& in);
 PassOptions to_pass_options(const lumicut_render_desc& in);
+// Fails where that is more than the machine's memory.
+void check_render_bytes(const Rect& crop, uint64_t bytes);
 
 }  // namespace lumicut

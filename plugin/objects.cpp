@@ -23,15 +23,15 @@ void Work::end(int32_t state) {
 
 std::shared_ptr<Progress> Work::share() {
   const std::lock_guard lock(mutex_);
+  if (shared_ == nullptr) shared_ = std::make_shared<Progress>();
   return shared_;
 }
 
-void Work::cancel() {
-  auto next = std::make_shared<Progress>();
+void Work::cancel() noexcept {
   const std::lock_guard lock(mutex_);
   run_->cancel();
-  shared_->cancel();
-  shared_ = std::move(next);
+  if (shared_ != nullptr) shared_->cancel();
+  shared_.reset();
 }
 
 double Work::seconds_locked() const {
@@ -182,6 +182,7 @@ void lumicut_integrator_t::prepare(lumicut_scene_t& of, const Params& with, Prog
   progress.check();
   into.set_value("vpls", static_cast<double>(next->vpls->lights.size()));
   into.set_value("light_paths", static_cast<double>(next->vpls->light_paths));
+  next->profiles = hold_profiles(next->vpls->lights);
   next->method = entry.create();
   next->standing_off = off_surfaces(*next->vpls, of.scene);
   next->method->prepare(of.scene, next->standing_off, *next->params, {progress, into});

@@ -29,7 +29,7 @@ class Work {
   void end(int32_t state);
   // For work that many threads do at once (shade): one Progress, replaced when it is cancelled.
   std::shared_ptr<Progress> share();
-  void cancel();
+  void cancel() noexcept;  // allocates nothing
   lumicut_status status() const;
   double seconds() const;
 
@@ -38,7 +38,7 @@ class Work {
   double seconds_locked() const;
 
   mutable std::mutex mutex_;
-  std::shared_ptr<Progress> run_ = std::make_shared<Progress>(), shared_ = std::make_shared<Progress>();
+  std::shared_ptr<Progress> run_ = std::make_shared<Progress>(), shared_;  // shared_: made when it is asked for
   int32_t state_ = LUMICUT_IDLE;
   Clock::time_point start_{}, end_{};
 };
@@ -73,6 +73,7 @@ struct Prepared {
   std::string params_key, vpls_key;    // the parameters it was made with: all, those of light tracing
   uint64_t host_lights = 0;            // which of the host's sets; 0: traced
   std::shared_ptr<const VplSet> vpls;  // as traced, or as the host gave them
+  std::vector<ProfileRef> profiles;    // theirs
   VplSet standing_off;                 // the same, off their surfaces: what the method shades with
   std::optional<Params> params;
   std::unique_ptr<Integrator> method;
@@ -110,8 +111,9 @@ struct lumicut_scene_t : lumicut::ObjectOf<lumicut_scene_t> {
   lumicut::Gate gate{lumicut::HandleKind::scene};
   lumicut::Work work;
   lumicut::Scene scene;
-  std::vector<lumicut::KeptProfile> profiles;  // for lights that are set after
-  bool changed = true;                         // beside the camera; which needs no new build and no new lights
+  std::vector<lumicut::ProfileRef> profiles;        // for lights that are set after
+  std::vector<lumicut::ProfileRef> light_profiles;  // of the lights as they are
+  bool changed = true;                              // beside the camera; which needs no new build and no new lights
   bool camera_changed = false;
   std::unique_ptr<lumicut::Stats> stats = std::make_unique<lumicut::Stats>();
   std::string stats_text;
@@ -136,6 +138,7 @@ struct lumicut_integrator_t : lumicut::ObjectOf<lumicut_integrator_t> {
   lumicut::Work work;
   lumicut::Params params;
   std::shared_ptr<const lumicut::VplSet> host_lights;  // null: traced
+  std::vector<lumicut::ProfileRef> host_profiles;      // theirs
   uint64_t host_lights_id = 0;                         // rises with each set; 0 where there are none
   uint64_t host_lights_sets = 0;
   std::unique_ptr<lumicut::Prepared> prepared;

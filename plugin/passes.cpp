@@ -28,6 +28,13 @@ uint64_t checksum(Header h, std::span<const uint8_t> body) {
   return hash_bytes(hash_bytes(0, &h, sizeof(h)), body.data(), body.size());
 }
 
+// A pixel's.
+uint64_t film_bytes(size_t groups) {
+  uint64_t components = 3 * groups;
+  for (const ChannelInfo& c : channel_table()) components += c.components;
+  return components * sizeof(float);
+}
+
 [[noreturn]] void fail_checkpoint(const std::string& what) { fail_argument("lumicut_render_desc.checkpoint: " + what); }
 
 }  // namespace
@@ -53,8 +60,21 @@ bool enough_passes(const PassOptions& options, uint32_t done, double seconds, do
   return options.target_error > 0.0 && done >= kMinPassesForError && error <= options.target_error;
 }
 
+uint64_t render_bytes(const Rect& crop, const PassOptions& options, size_t groups) {
+  const uint64_t film = film_bytes(groups), state = film + PassMean::kBytes;
+  uint64_t bytes = film;
+  // The pass beside the mean; a list in which the image's error is looked up.
+  if (options.progressive()) bytes += film + PassMean::kBytes + sizeof(double);
+  // One is made, one is the last, one is what a host looks at. Or the one that the render goes on from.
+  bytes += state * (options.checkpoints ? 3 : options.resume.empty() ? 0 : 1);
+  return bytes * crop.width() * crop.height();
+}
+
 std::vector<uint8_t> save_passes(const std::string& key, uint32_t done, const PassMean& mean, const Film& film) {
-  std::vector<uint8_t> bytes(sizeof(Header));
+  std::vector<uint8_t> bytes;
+  const uint64_t pixels = uint64_t{film.crop().width()} * film.crop().height();
+  bytes.reserve(sizeof(Header) + key.size() + pixels * (PassMean::kBytes + film_bytes(film.groups().size())));
+  bytes.resize(sizeof(Header));
   bytes.insert(bytes.end(), key.begin(), key.end());
   mean.save(bytes);
   Header h{};

@@ -37,6 +37,10 @@ bool enough_passes(const PassOptions& options, uint32_t done, double seconds, do
 std::vector<uint8_t> save_passes(const std::string& key, uint32_t done, const PassMean& mean, const Film& film);
 uint32_t load_passes(const std::vector<uint8_t>& bytes, const std::string& key, PassMean& mean, Film& film);
 
+// Memory that a render takes at its peak, in bytes: films, what averages them, checkpoints. Not what grows with the scene
+// or the tile.
+uint64_t render_bytes(const Rect& crop, const PassOptions& options, size_t groups);
+
 // Of all that decides the image beside the number of passes [plugin/identity.h]. `host_lights`: null where they are
 // traced.
 std::string passes_key(const Scene& scene, const std::string& integrator, const Params& params,

@@ -16,7 +16,7 @@ lumicut_render_t::lumicut_render_t(lumicut_integrator_t& integrator, lumicut_sce
     : options(o),
       integrator_(integrator),
       scene_(scene),
-      film_(o.crop),
+      film_(Rect{}),
       passes_(std::move(passes)),
       columns_(tiles_across(o.crop.width(), o.tile_size)),
       rows_(tiles_across(o.crop.height(), o.tile_size)),
@@ -24,7 +24,8 @@ lumicut_render_t::lumicut_render_t(lumicut_integrator_t& integrator, lumicut_sce
   using_integrator_ = integrator.gate.change("a render");
   using_scene_ = scene.gate.read("a render");
   scene.require_committed();
-  if (passes_.groups) film_ = Film(o.crop, light_groups(scene.scene));
+  std::vector<uint32_t> groups;
+  if (passes_.groups) groups = light_groups(scene.scene);
   if (!scene.scene.has_camera()) fail_state("lumicut_scene: it has no camera");
   if (scene.device.get() != integrator.device.get())
     fail_argument("lumicut_scene: it belongs to another device than the integrator");
@@ -34,9 +35,13 @@ lumicut_render_t::lumicut_render_t(lumicut_integrator_t& integrator, lumicut_sce
   if (passes_.groups && integrator.entry.light_source == LightSource::emitters)
     fail_argument(std::string("lumicut_render_desc.flags: ") + integrator.entry.id +
                   " has no virtual lights, so LUMICUT_GROUPS means nothing to it");
-  if (film_.groups().size() > kMaxGroups)
-    fail_argument("lumicut_render_desc.flags: LUMICUT_GROUPS with " + number_text(uint64_t{film_.groups().size()}) +
+  if (groups.size() > kMaxGroups)
+    fail_argument("lumicut_render_desc.flags: LUMICUT_GROUPS with " + number_text(uint64_t{groups.size()}) +
                   " light groups; at most " + number_text(uint64_t{kMaxGroups}) + " can be told apart in one render");
+  const uint64_t bytes = render_bytes(o.crop, passes_, groups.size());
+  check_render_bytes(o.crop, bytes);
+  stats.set_value("estimated_bytes", static_cast<double>(bytes));
+  film_ = Film(o.crop, std::move(groups));
   progress_ = work.begin();
   thread_ = std::thread([this] { run(); });
 }
@@ -47,7 +52,14 @@ lumicut_render_t::~lumicut_render_t() {
 }
 
 void lumicut_render_t::run() noexcept {
-  const lumicut_result result = guard([this] { integrator_->device->arena.run([this] { render(); }); });
+  lumicut_result result = LUMICUT_OK;
+  std::exception_ptr failure;
+  try {
+    integrator_->device->arena.run([this] { render(); });
+  } catch (...) {
+    result = report_exception();
+    failure = std::current_exception();
+  }
   const bool failed = result != LUMICUT_OK && result != LUMICUT_CANCELLED;
   const auto& log = integrator_->device->log;
   guard([&] {
@@ -60,8 +72,7 @@ void lumicut_render_t::run() noexcept {
   using_integrator_.drop();
   using_scene_.drop();
   const std::lock_guard lock(mutex_);
-  result_ = result;
-  guard([&] { error_ = result == LUMICUT_OK ? "" : last_error(); });
+  failure_ = failure;
   work.end(result == LUMICUT_OK ? LUMICUT_DONE : (failed ? LUMICUT_FAILED : LUMICUT_STOPPED));
   over_ = true;
   ended_.notify_all();
@@ -128,15 +139,15 @@ void lumicut_render_t::render_passes() {
     error = mean.error(film_, done);
     stats.set_value("passes", done);
     if (done >= 2) stats.set_value("error", error);
-    std::vector<uint8_t> bytes;
-    if (passes_.checkpoints) bytes = save_passes(key, done, mean, film_);
+    std::shared_ptr<const std::vector<uint8_t>> bytes;
+    if (passes_.checkpoints) bytes = std::make_shared<const std::vector<uint8_t>>(save_passes(key, done, mean, film_));
     const std::lock_guard lock(mutex_);
     passes_done_ = done, error_of_passes_ = error;
     checkpoint_ = std::move(bytes);
   };
   if (!passes_.resume.empty()) {
     done = load_passes(passes_.resume, key, mean, film_);
-    passes_.resume = {};
+    passes_.resume = std::vector<uint8_t>();  // frees it, which "= {}" does not
     finish_pass();
     for (uint32_t row = 0; row < rows_; ++row)
       for (uint32_t column = 0; column < columns_; ++column) tile_done(tile_rect(column, row));
@@ -176,8 +187,8 @@ void lumicut_render_t::render_passes() {
 const std::vector<uint8_t>& lumicut_render_t::checkpoint() {
   if (!passes_.checkpoints) fail_state("lumicut_render_checkpoint: the render was started without LUMICUT_CHECKPOINTS");
   const std::lock_guard lock(mutex_);
-  shown_checkpoint_ = checkpoint_;
-  return shown_checkpoint_;
+  if (checkpoint_ != nullptr) shown_checkpoint_ = checkpoint_;
+  return *shown_checkpoint_;
 }
 
 Rect lumicut_render_t::tile_rect(uint32_t column, uint32_t row) const {
@@ -206,15 +217,14 @@ lumicut_status lumicut_render_t::status() const {
   return s;
 }
 
-std::optional<Error> lumicut_render_t::wait(uint32_t milliseconds) const {
+std::exception_ptr lumicut_render_t::wait(uint32_t milliseconds) const {
   std::unique_lock lock(mutex_);
   const auto over = [this] { return over_; };
   if (milliseconds == LUMICUT_FOREVER)
     ended_.wait(lock, over);
   else
     ended_.wait_for(lock, std::chrono::milliseconds(milliseconds), over);
-  if (!over_ || result_ == LUMICUT_OK) return std::nullopt;
-  return Error(static_cast<ErrorCode>(result_), error_);
+  return over_ ? failure_ : nullptr;
 }
 
 Rect lumicut_render_t::next_tile() {

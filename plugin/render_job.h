@@ -4,6 +4,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <deque>
+#include <exception>
 #include <functional>
 #include <limits>
 #include <thread>
@@ -23,8 +24,8 @@ struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
   ~lumicut_render_t();
 
   lumicut_status status() const;
-  // Waits until the render ends, at most so long. Gives the error of a render that failed or was cancelled.
-  std::optional<lumicut::Error> wait(uint32_t milliseconds) const;
+  // Waits until the render ends, at most so long. Gives what a render that failed or was cancelled threw.
+  std::exception_ptr wait(uint32_t milliseconds) const;
   // The next tile that is done, once each; x1 = 0 where there is none now.
   lumicut::Rect next_tile();
   // State after the last whole pass; stays until the next call.
@@ -76,10 +77,11 @@ struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
   uint64_t tiles_done_ = 0;
   uint32_t passes_done_ = 0;
   double error_of_passes_ = std::numeric_limits<double>::infinity();
-  std::vector<uint8_t> checkpoint_, shown_checkpoint_;
+  // The last, and the one that a host looks at, which may be older.
+  std::shared_ptr<const std::vector<uint8_t>> checkpoint_,
+      shown_checkpoint_ = std::make_shared<const std::vector<uint8_t>>();
   mutable std::mutex film_mutex_;  // of passes: pixels change while hosts read them
   bool over_ = false;
-  lumicut_result result_ = LUMICUT_OK;
-  std::string error_;
+  std::exception_ptr failure_;
   std::thread thread_;  // last: all above stands before it starts
 };

@@ -37,14 +37,50 @@ double ring(double a, double b, double t0, double t1) {
   return a * std::cos(t0) - b * std::cos(t1) + slope * (std::sin(t1) - std::sin(t0));
 }
 
+// By name, with open addressing. Only a slot of the name that is looked for is read beyond its name, and who looks for
+// one holds it: so it stays what it is meanwhile, and looking needs no lock.
+struct Slot {
+  std::atomic<uint32_t> id{0};
+  std::atomic<const LightProfile*> profile{nullptr};
+  std::weak_ptr<const LightProfile> held;  // under the mutex
+};
+constexpr uint32_t kFree = 0, kFreed = 2;  // names are odd
+
 struct Registry {
-  std::array<std::atomic<const LightProfile*>, kSlots> slots{};
+  std::array<Slot, kSlots> slots;
   std::mutex mutex;
   size_t count = 0;
 };
+// Never destroyed: profiles go while static objects do.
 Registry& registry() {
-  static Registry r;
+  static Registry& r = *new Registry;
   return r;
+}
+
+Slot* slot_of(uint32_t id) {
+  Registry& r = registry();
+  for (size_t i = hash64(id) % kSlots, n = 0; n < kSlots; i = (i + 1) % kSlots, ++n) {
+    const uint32_t found = r.slots[i].id.load(std::memory_order_acquire);
+    if (found == id) return &r.slots[i];
+    if (found == kFree) break;
+  }
+  return nullptr;
+}
+
+// The last who held it has let it go; somebody else may have kept one of the same name since.
+void forget(const LightProfile* profile) {
+  Registry& r = registry();
+  {
+    const std::lock_guard lock(r.mutex);
+    Slot* const slot = slot_of(profile->id());
+    if (slot != nullptr && slot->profile.load(std::memory_order_relaxed) == profile) {
+      slot->profile.store(nullptr, std::memory_order_relaxed);
+      slot->held.reset();
+      slot->id.store(kFreed, std::memory_order_release);
+      --r.count;
+    }
+  }
+  delete profile;
 }
 
 }  // namespace
@@ -125,23 +161,39 @@ void LightProfile::sample(double u, float v, float w, float& vertical, float& ho
   pdf = static_cast<float>((cdf_[cell + 1] - cdf_[cell]) / (cdf_.back() * solid));
 }
 
-uint32_t keep_profile(LightProfile profile) {
+ProfileRef keep_profile(LightProfile profile) {
   Registry& r = registry();
-  const std::lock_guard lock(r.mutex);
   const uint32_t id = profile.id();
-  for (size_t i = hash64(id) % kSlots;; i = (i + 1) % kSlots) {
-    const LightProfile* found = r.slots[i].load(std::memory_order_acquire);
-    if (found != nullptr && found->id() == id) {
-      if (!(*found == profile)) throw Error(ErrorCode::unsupported, "two light profiles share one name by chance");
-      return id;
+  // Made before the lock is taken and freed after it is gone: what frees one takes it too.
+  ProfileRef made(new LightProfile(std::move(profile)), forget);
+  ProfileRef old;
+  const std::lock_guard lock(r.mutex);
+  Slot* slot = slot_of(id);
+  if (slot != nullptr) {
+    old = slot->held.lock();
+    if (old != nullptr) {
+      if (!(*old == *made)) throw Error(ErrorCode::unsupported, "two light profiles share one name by chance");
+      return old;
     }
-    if (found != nullptr) continue;
+  } else {
     if (r.count >= kMostProfiles) throw Error(ErrorCode::unsupported, "more than 4096 different light profiles");
     ++r.count;
-    // Kept for good: kernels read it without a lock, and a table is a few kilobytes.
-    r.slots[i].store(new LightProfile(std::move(profile)), std::memory_order_release);
-    return id;
+    size_t i = hash64(id) % kSlots;
+    while ((r.slots[i].id.load(std::memory_order_relaxed) & 1u) != 0) i = (i + 1) % kSlots;
+    slot = &r.slots[i];
   }
+  slot->held = made;
+  slot->profile.store(made.get(), std::memory_order_relaxed);
+  slot->id.store(id, std::memory_order_release);
+  return made;
+}
+
+ProfileRef hold_profile(uint32_t id) {
+  Registry& r = registry();
+  ProfileRef held;
+  const std::lock_guard lock(r.mutex);
+  if (Slot* const slot = id != 0 ? slot_of(id) : nullptr) held = slot->held.lock();
+  return held;
 }
 
 float profile_share(const Vpl& v, const Vec3f& direction) {
@@ -154,11 +206,8 @@ float profile_share(const Vpl& v, const Vec3f& direction) {
 }
 
 const LightProfile* find_profile(uint32_t id) {
-  const Registry& r = registry();
-  for (size_t i = hash64(id) % kSlots;; i = (i + 1) % kSlots) {
-    const LightProfile* found = r.slots[i].load(std::memory_order_acquire);
-    if (found == nullptr || found->id() == id) return found;
-  }
+  const Slot* const slot = id != 0 ? slot_of(id) : nullptr;
+  return slot != nullptr ? slot->profile.load(std::memory_order_acquire) : nullptr;
 }
 
 }  // namespace lumicut

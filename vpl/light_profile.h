@@ -1,11 +1,14 @@
-// Measured lamps: intensity by direction, as photometric files have it. Tables live as long as the process and are
-// named by a hash of their content, so that VPLs carry the name through files, states and kernels alike.
+// Measured lamps: intensity by direction, as photometric files have it. Tables live as long as somebody holds them and
+// are named by a hash of their content, so that VPLs carry the name through files, states and kernels alike.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
+#include "core/error.h"
 #include "core/fields.h"
 #include "core/vec.h"
 
@@ -42,9 +45,29 @@ class LightProfile {
   LUMICUT_FIELDS(LightProfile, vertical_, horizontal_, values_, cdf_, largest_, cos_outer_, id_)
 };
 
-// Keeps the profile for good; one of the same content is kept once. Never 0. Throws Error where 4096 are kept already.
-uint32_t keep_profile(LightProfile profile);
-// nullptr: none of that name. Lock-free.
+using ProfileRef = std::shared_ptr<const LightProfile>;
+
+// One of the same content is kept once. Its name is never 0. Throws Error where 4096 are kept already.
+ProfileRef keep_profile(LightProfile profile);
+// Of that name, where somebody holds it.
+ProfileRef hold_profile(uint32_t id);
+// The same for those who know that it is held meanwhile: lock-free. nullptr: none of that name.
 const LightProfile* find_profile(uint32_t id);
+
+// All that these lights (lamps, or virtual ones) name, each once. Throws Error where nobody holds one of them.
+template <typename Lights>
+std::vector<ProfileRef> hold_profiles(const Lights& lights) {
+  std::vector<uint32_t> ids;
+  for (const auto& light : lights)
+    if (light.profile != 0 && (ids.empty() || ids.back() != light.profile)) ids.push_back(light.profile);
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  std::vector<ProfileRef> held;
+  for (const uint32_t id : ids) {
+    held.push_back(hold_profile(id));
+    if (held.back() == nullptr) fail_argument("light profile " + std::to_string(id) + ": no scene and no light has it");
+  }
+  return held;
+}
 
 }  // namespace lumicut

@@ -49,11 +49,11 @@ inline Vpl random_light(Rng& rng, VplKind kind, float half) {
     v.spread_tan = rng.next_below(2) == 0 ? 0.0f : 4.0f * rng.next_float();
     if (v.spread_tan > 0) v.spot_cosine = 1.0f;
     if (rng.next_below(3) == 0) {
-      static const uint32_t kProfiles[2] = {
+      static const ProfileRef kProfiles[2] = {
           keep_profile(LightProfile({0.0f, 0.7f, 1.1f, 3.1f}, {0.0f}, {1.0f, 3.0f, 0.5f, 0.1f})),
           keep_profile(LightProfile({0.0f, 0.5f, 1.0f, 1.5f}, {0.0f, 1.5f, 4.0f, 6.2831853f},
                                     {1, 2, 1, 0, 1, 0, 3, 0, 1, 4, 0, 0, 1, 2, 1, 0}))};
-      v.profile = kProfiles[rng.next_below(2)];
+      v.profile = kProfiles[rng.next_below(2)]->id();
       const Vec3f tangent = Frame(v.normal).t;
       v.cos_outer = find_profile(v.profile)->cos_outer();
       v.blend_cosine = tangent.x, v.spot_cosine = tangent.y, v.spread_tan = tangent.z;

@@ -28,7 +28,9 @@ LightProfile lopsided() {
 std::unique_ptr<Scene> lit_by(const LightProfile& profile) {
   auto scene = std::make_unique<Scene>(Scene::Config{});
   Light l;
-  l.profile = keep_profile(profile);
+  static std::vector<ProfileRef> held;  // as long as the scenes
+  held.push_back(keep_profile(profile));
+  l.profile = held.back()->id();
   l.direction = normalize(Vec3f{1, -2, 0.5f});
   l.tangent = Frame(l.direction).t;
   l.value = {2, 2, 2};
@@ -104,6 +106,22 @@ TEST(LightProfile, OneOfTheSameContentIsKeptOnce) {
   const LightProfile other({0.0f, 1.0f}, {0.0f}, {1, 1});
   EXPECT_NE(keep_profile(other), keep_profile(lopsided()));
   EXPECT_EQ(find_profile(0), nullptr);
+}
+
+TEST(LightProfile, GoesWithTheLastWhoHoldsIt) {
+  const LightProfile table({0.0f, 1.25f}, {0.0f}, {3, 1});
+  const uint32_t id = table.id();
+  EXPECT_EQ(hold_profile(id), nullptr);
+  ProfileRef one = keep_profile(table), other = hold_profile(id);
+  EXPECT_EQ(find_profile(id), one.get());
+  one.reset();
+  EXPECT_EQ(find_profile(id), other.get());
+  other.reset();
+  EXPECT_EQ(find_profile(id), nullptr);
+  for (int i = 0; i < 20000; ++i)  // one after another there may be more than there is room for
+    one = keep_profile(LightProfile({0.0f, 1.0f}, {0.0f}, {1, static_cast<float>(i)}));
+  EXPECT_EQ(find_profile(one->id()), one.get());
+  EXPECT_EQ(find_profile(id), nullptr);
 }
 
 TEST(LightProfile, TablesThatMakeNoSenseAreRefused) {
