@@ -11,7 +11,6 @@ ROOT = pathlib.Path(os.environ.get("LUMICUT_SOURCE_DIR", pathlib.Path(__file__).
 BUILD = pathlib.Path(os.environ.get("LUMICUT_BINARY_DIR", ROOT / "build/release"))
 CC, CXX = os.environ.get("CC", "cc"), os.environ.get("CXX", "c++")
 CMAKE = os.environ.get("LUMICUT_CMAKE", "cmake")
-SANITIZE = os.environ.get("LUMICUT_SANITIZE", "")
 INCLUDE = ROOT / "plugin/include"
 HEADER = INCLUDE / "lumicut/lumicut.h"
 LIBRARY = BUILD / "lib/liblumicut.so"
@@ -115,7 +114,6 @@ class Install(unittest.TestCase):
         cls.project.mkdir()
         (cls.project / "main.cpp").write_text(MAIN)
         (cls.project / "CMakeLists.txt").write_text(PROJECT)
-        cls.flags = [f"-fsanitize={SANITIZE}"] if SANITIZE else []
 
     @classmethod
     def tearDownClass(cls):
@@ -123,8 +121,7 @@ class Install(unittest.TestCase):
 
     def test_a_project_finds_it_with_find_package(self):
         build = self.project / "build"
-        run(CMAKE, "-S", self.project, "-B", build, f"-DCMAKE_PREFIX_PATH={self.prefix}", f"-DCMAKE_CXX_COMPILER={CXX}",
-            f"-DCMAKE_CXX_FLAGS={' '.join(self.flags)}")
+        run(CMAKE, "-S", self.project, "-B", build, f"-DCMAKE_PREFIX_PATH={self.prefix}", f"-DCMAKE_CXX_COMPILER={CXX}")
         run(CMAKE, "--build", build)
         self.assertEqual(run(build / "host"), "Lumicut 1.0.0, 60000 lights")
 
@@ -135,7 +132,7 @@ class Install(unittest.TestCase):
         flags = run("pkg-config", "--cflags", "--libs", "lumicut", env=environment).split()
         self.assertEqual(run("pkg-config", "--modversion", "lumicut", env=environment).strip(), "1.0.0")
         program = self.project / "with_pkg_config"
-        run(CXX, "-std=c++17", *self.flags, self.project / "main.cpp", "-o", program, *flags,
+        run(CXX, "-std=c++17", self.project / "main.cpp", "-o", program, *flags,
             f"-Wl,-rpath,{next(self.prefix.rglob('liblumicut.so')).parent}")
         self.assertEqual(run(program), "Lumicut 1.0.0, 60000 lights")
 
