@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "io/warnings.h"
 #include "lumicut/lumicut.h"
 
 namespace lumicut::io {
@@ -48,7 +49,7 @@ struct SceneData {
   std::optional<lumicut_environment> environment;
   lumicut_camera camera{};
   uint32_t width = 512, height = 512, samples = 1;  // what the scene file proposes
-  std::vector<std::string> warnings;                // what is approximated or looks wrong
+  Warnings warnings;                                // what is approximated or looks wrong
 
   uint64_t triangle_count() const {
     uint64_t n = 0;

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <iterator>
 #include <map>
+#include <set>
 
 #include "io/file_error.h"
 #include "io/ies_file.h"
@@ -441,8 +442,7 @@ class SceneReader {
     const auto one = object.find("material");
     const auto changes = object.find("materials");
     if (one && changes) object.value().fail("give either \"material\" (for all) or \"materials\" (by name)");
-    ObjModel model = read_obj(file, {.read_materials = !one}, textures_);
-    scene_.warnings.insert(scene_.warnings.end(), model.warnings.begin(), model.warnings.end());
+    ObjModel model = read_obj(file, {.read_materials = !one}, textures_, scene_.warnings);
     std::vector<uint32_t> numbers;
     if (one) {
       numbers.push_back(material(*one));
@@ -462,9 +462,10 @@ class SceneReader {
     std::vector<uint32_t> numbers;
     std::vector<std::string> names;
     for (const auto& m : model.materials) names.push_back(m.name);
+    const std::set<std::string> known(names.begin(), names.end());
     if (object)
       for (const auto& item : changes->raw().items())
-        if (std::find(names.begin(), names.end(), item.key()) == names.end()) {
+        if (known.count(item.key()) == 0) {
           const std::string near = nearest_word(item.key(), names);
           changes->fail(fmt::format("{} has no material \"{}\"{}", file, item.key(),
                                     near.empty() ? "" : "; did you mean \"" + near + "\"?"));
@@ -763,7 +764,7 @@ class SceneReader {
     bool lit = !scene_.lights.empty() || scene_.environment.has_value();
     for (const auto& m : scene_.materials)
       lit = lit || m.values.emission[0] + m.values.emission[1] + m.values.emission[2] > 0;
-    if (!lit) scene_.warnings.push_back(path_ + ": has no light at all; the image will be black");
+    if (!lit) scene_.warnings.add("scenes without light", path_, "has no light at all; the image will be black");
   }
 
   std::string path_;

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <filesystem>
 #include <istream>
+#include <iterator>
 #include <map>
 #include <set>
 #include <sstream>
@@ -15,6 +16,7 @@
 #include <string_view>
 
 #include "io/file_error.h"
+#include "io/text_lines.h"
 
 namespace lumicut::io {
 
@@ -22,6 +24,8 @@ namespace {
 
 constexpr size_t kMaxCorners = 1024;  // of one polygon: clipping ears takes quadratic time
 constexpr size_t kMaxCount = size_t{1} << 31;
+
+constexpr uint32_t kMaxChain = 64;  // vertices of one position that are searched for the same uv and normal
 
 std::string trimmed(std::string_view text) {
   const size_t first = text.find_first_not_of(" \t\r\n\"");
@@ -31,107 +35,261 @@ std::string trimmed(std::string_view text) {
 
 std::string shown(std::string_view text) {
   std::string out;
-  for (const char c : text.substr(0, 60)) out += c >= ' ' && c <= '~' ? c : '?';
+  for (const char c : text.substr(0, 60)) out += static_cast<unsigned char>(c) >= ' ' && c != '\x7f' ? c : '?';
   return out;
+}
+
+// First word of a line, and what follows it.
+std::pair<std::string_view, std::string_view> split_key(std::string_view line) {
+  const size_t first = std::min(line.find_first_not_of(" \t"), line.size());
+  const size_t end = std::min(line.find_first_of(" \t", first), line.size());
+  return {line.substr(first, end - first), line.substr(end)};
 }
 
 // Memory as a stream that can tell which line was read last: tinyobjloader itself keeps no count.
 class LineBuffer : public std::streambuf {
  public:
   explicit LineBuffer(std::string& text) : text_(text) { setg(text.data(), text.data(), text.data() + text.size()); }
-  // Start and text of the line before the read position.
+  // The line before the read position.
   std::string_view last_line() const {
     const char* end = gptr();
-    while (end > eback() && (end[-1] == '\n' || end[-1] == '\r')) --end;
+    if (end > eback() && end[-1] == '\n') --end;
     const char* begin = end;
-    while (begin > eback() && begin[-1] != '\n' && begin[-1] != '\r') --begin;
+    while (begin > eback() && begin[-1] != '\n') --begin;
     return {begin, static_cast<size_t>(end - begin)};
   }
-  int line_number(std::string_view line) const {
-    int count = 1;
-    for (const char* c = text_.data(); c < line.data(); ++c)
-      if (*c == '\n' || (*c == '\r' && c[1] != '\n')) ++count;
-    return count;
-  }
+  size_t offset(std::string_view line) const { return static_cast<size_t>(line.data() - text_.data()); }
 
  private:
   std::string& text_;
 };
 
-// ---- MTL ------------------------------------------------------------------------------------------------------------
+// ---- Names of files -------------------------------------------------------------------------------------------------
 
-struct MtlScan {
-  std::map<std::string, int> lines;  // material -> line of its newmtl
+// ASCII letters alone.
+std::string lower(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
+bool is_file(const std::filesystem::path& path) {
+  std::error_code code;
+  return std::filesystem::exists(path, code) && !std::filesystem::is_directory(path, code);
+}
+
+// The same path in whatever case its folders and its name are written; "" when there is none.
+std::filesystem::path in_other_case(const std::filesystem::path& path) {
+  std::filesystem::path found;
+  for (const auto& part : path) {
+    std::error_code code;
+    std::filesystem::path next = found / part;
+    if (!std::filesystem::exists(next, code)) {
+      next.clear();
+      for (std::filesystem::directory_iterator i(found.empty() ? "." : found, code), end; !code && i != end;
+           i.increment(code))
+        if (lower(i->path().filename().string()) == lower(part.string()) && (next.empty() || i->path() < next))
+          next = found / i->path().filename();
+      if (next.empty()) return "";
+    }
+    found = next;
+  }
+  return found;
+}
+
+struct FoundFile {
+  std::string path;    // "": none
+  std::string remark;  // how it differs from what was asked for
 };
 
-bool is_finite_number(const std::string& word) {
-  char* end = nullptr;
-  const double value = std::strtod(word.c_str(), &end);
-  return end != word.c_str() && *end == '\0' && std::isfinite(value) && std::abs(value) < 3.4e38;
+// A file that `name` in `file` may mean: relative to the folder of `file`, with slashes either way, in other case, or,
+// where `name` is an absolute path of another machine, its last part beside `file`.
+FoundFile find_beside(const std::string& file, const std::string& name) {
+  const auto folder = std::filesystem::path(file).parent_path();
+  std::string slashes = name;
+  std::replace(slashes.begin(), slashes.end(), '\\', '/');
+  const bool drive = slashes.size() > 2 && std::isalpha(static_cast<unsigned char>(slashes[0])) && slashes[1] == ':';
+  const bool absolute = drive || slashes[0] == '/';
+  for (const std::string& spelling : {name, slashes})
+    if (is_file(folder / spelling)) return {(folder / spelling).string(), ""};
+  if (!drive)
+    if (const auto path = in_other_case(folder / slashes); is_file(path))
+      return {path.string(), fmt::format("{} is read in its place", shown(path.filename().string()))};
+  if (absolute) {
+    const auto last = folder / slashes.substr(slashes.rfind(drive && slashes[2] != '/' ? ':' : '/') + 1);
+    for (const auto& path : {last, in_other_case(last)})
+      if (is_file(path)) return {path.string(), fmt::format("{} is read in its place", shown(path.string()))};
+  }
+  return {};
 }
 
-// tinyobjloader takes a number that is none for 0: look first.
-MtlScan scan_mtl(const std::string& path, const std::string& text) {
-  static const std::map<std::string, std::pair<size_t, bool>> kNumbers = {
-      // key -> (least count, may be negative)
-      {"Kd", {1, false}}, {"Ks", {1, false}}, {"Ka", {1, false}}, {"Ke", {1, false}},   {"Ns", {1, false}},
-      {"Ni", {1, false}}, {"d", {1, false}},  {"Tr", {1, false}}, {"illum", {1, false}}};
-  MtlScan scan;
-  std::istringstream in(text);
-  std::string line;
-  for (int number = 1; std::getline(in, line); ++number) {
-    std::istringstream words(line);
-    std::string key, word;
-    if (!(words >> key)) continue;
-    if (key == "newmtl") {
-      std::getline(words, word);
-      const std::string name = trimmed(word);
-      if (name.empty()) throw FileError(path, fmt::format("line {}: newmtl without a name", number));
-      if (!scan.lines.emplace(name, number).second)
-        throw FileError(path, fmt::format("line {}: the material \"{}\" stands twice", number, shown(name)));
-      continue;
+// ---- MTL ------------------------------------------------------------------------------------------------------------
+
+constexpr char kUnreadMtl[] = "statements that are not read";
+
+// What one newmtl begins.
+struct MtlRecord {
+  std::string name;
+  int line;
+  std::map<std::string, int> lines;  // of its other keys
+};
+
+bool is_number(const std::string& word, double& value) {
+  char* end = nullptr;
+  value = std::strtod(word.c_str(), &end);
+  return end != word.c_str() && *end == '\0' && word.find_first_of("xX") == std::string::npos;
+}
+
+// An MTL in the form that tinyobjloader reads rightly: it takes a number that is none for 0, a missing one too, and the
+// names after options of too few numbers for numbers. Records are named by their index.
+class MtlCleaner {
+ public:
+  MtlCleaner(const std::string& path, std::string text, Warnings& warnings)
+      : path_(path), text_(plain_text(std::move(text), path)), counter_(text_), warnings_(warnings) {}
+
+  std::string clean() {
+    for (size_t begin = 0; begin < text_.size();) {
+      const size_t end = std::min(text_.find('\n', begin), text_.size());
+      number_ = counter_.line(begin);
+      const auto [key, rest] = split_key(std::string_view(text_).substr(begin, end - begin));
+      statement(std::string(key), rest);
+      begin = end + 1;
     }
-    const auto rule = kNumbers.find(key);
-    if (rule == kNumbers.end()) continue;
+    end_record();
+    return std::move(out_);
+  }
+  const std::vector<MtlRecord>& records() const { return records_; }
+
+ private:
+  [[noreturn]] void fail(const std::string& text) const {
+    throw FileError(path_, fmt::format("line {}: {}", number_, text));
+  }
+  void warn(const char* kind, const std::string& text) { warnings_.add(kind, path_, number_, text); }
+
+  void statement(const std::string& key, std::string_view rest) {
+    static const std::set<std::string> kColours = {"Kd", "Ks", "Ke", "Ka"};
+    static const std::set<std::string> kNumbers = {"Ns", "Ni", "d", "Tr", "illum"};
+    static const std::set<std::string> kTextures = {"map_Kd", "map_Ks", "map_Ke", "map_d"};
+    if (key == "newmtl") {
+      end_record();
+      const std::string name = trimmed(rest);
+      if (name.empty()) fail("newmtl without a name");
+      out_ += fmt::format("newmtl {}\n", records_.size());
+      records_.push_back({name, number_, {}});
+    } else if (kColours.count(key) || kNumbers.count(key)) {
+      numbers(key, rest, kColours.count(key) != 0);
+    } else if (kTextures.count(key)) {
+      texture(key, rest);
+    }
+  }
+
+  void numbers(const std::string& key, std::string_view rest, bool colour) {
+    std::istringstream words{std::string(rest)};
+    std::string word, line = key;
     size_t count = 0;
-    while (words >> word) {
-      if (word == "spectral" || word == "xyz" || word == "-halo" || word[0] == '#') break;
-      if (!is_finite_number(word))
-        throw FileError(path, fmt::format("line {}: \"{}\" of {} is not a finite number", number, shown(word), key));
-      if (!rule->second.second && word[0] == '-' && std::strtod(word.c_str(), nullptr) < 0.0)
-        throw FileError(path, fmt::format("line {}: {} is {}, but must not be negative", number, key, shown(word)));
+    while (words >> word && word[0] != '#') {
+      if (word == "-halo") continue;
+      if (count == 0 && (word == "spectral" || word == "xyz")) {
+        warn(kUnreadMtl, fmt::format("{} {} is not read", key, word));
+        return;
+      }
+      double value = 0;
+      if (!is_number(word, value) || !(std::abs(value) < 3.4e38))
+        fail(fmt::format("\"{}\" of {} is not a finite number", shown(word), key));
+      if (value < 0) {
+        if (!colour && key != "Ns") fail(fmt::format("{} is {}, but must not be negative", key, shown(word)));
+        warn("negative numbers taken as 0", fmt::format("{} is {}; taken as 0", key, shown(word)));
+        word = "0";
+      }
+      line += " " + word;
       ++count;
     }
-    if (count < rule->second.first && words.eof())
-      throw FileError(path, fmt::format("line {}: {} without a number", number, key));
+    if (count == 0) fail(fmt::format("{} without a number", key));
+    if (colour && count == 2) fail(fmt::format("{} has 2 numbers instead of 1 or 3", key));
+    if (colour && count == 1) line += " " + line.substr(key.size() + 1) + " " + line.substr(key.size() + 1);
+    emit(key, line);
   }
-  return scan;
-}
 
-std::string beside(const std::string& file, std::string name) {
-  std::replace(name.begin(), name.end(), '\\', '/');
-  const std::filesystem::path path(name);
-  return path.is_absolute() ? name : (std::filesystem::path(file).parent_path() / path).string();
-}
+  void texture(const std::string& key, std::string_view rest) {
+    // Option -> numbers it may have, and what they are when left out; none: one word.
+    static const std::map<std::string_view, std::vector<std::string>> kOptions = {
+        {"-o", {"0", "0", "0"}}, {"-s", {"1", "1", "1"}}, {"-t", {"0", "0", "0"}}, {"-mm", {"0", "1"}}, {"-blendu", {}},
+        {"-blendv", {}},         {"-clamp", {}},          {"-boost", {}},          {"-bm", {}},         {"-texres", {}},
+        {"-imfchan", {}},        {"-type", {}},           {"-colorspace", {}},     {"-cc", {}}};
+    std::string line = key;
+    for (;;) {
+      const auto [word, after] = split_key(rest);
+      const auto option = kOptions.find(word);
+      if (option == kOptions.end()) break;
+      std::string values;
+      rest = after;
+      for (const std::string& usual : option->second) {
+        const auto [value, behind] = split_key(rest);
+        double number = 0;
+        const bool given = is_number(std::string(value), number);
+        values += " " + (given ? std::string(value) : usual);
+        if (given) rest = behind;
+      }
+      if (option->second.empty()) {
+        const auto [value, behind] = split_key(rest);
+        values = " " + std::string(value);
+        rest = behind;
+      }
+      if (word != "-cc") line += " " + std::string(word) + values;  // unknown to tinyobjloader
+    }
+    const std::string name = trimmed(rest);
+    if (name.empty()) {
+      warn(kUnreadMtl, fmt::format("{} names no file", key));
+      return;
+    }
+    emit(key, line + " " + name);
+  }
+
+  void emit(const std::string& key, const std::string& line) {
+    if (records_.empty()) {
+      warn(kUnreadMtl, fmt::format("{} stands before the first newmtl", key));
+      return;
+    }
+    records_.back().lines[key] = number_;
+    out_ += line + "\n";
+  }
+
+  // tinyobjloader's colour under a texture without Kd depends on the materials before.
+  void end_record() {
+    if (!records_.empty() && records_.back().lines.count("map_Kd") && !records_.back().lines.count("Kd"))
+      out_ += "Kd 1 1 1\n";
+  }
+
+  const std::string& path_;
+  std::string text_;
+  LineCounter counter_;
+  Warnings& warnings_;
+  std::vector<MtlRecord> records_;
+  std::string out_;
+  int number_ = 0;
+};
 
 uint32_t texture_flags(const tinyobj::texture_option_t& options) {
   return options.clamp ? uint32_t{LUMICUT_CLAMP} : 0u;
 }
 
-void read_mtl(const std::string& path, ObjModel& model, TextureStore& textures) {
-  const std::string text = read_whole_file(path, uint64_t{256} << 20);
-  const MtlScan scan = scan_mtl(path, text);
+void read_mtl(const std::string& path, ObjModel& model, std::map<std::string, uint32_t>& by_name,
+              TextureStore& textures, Warnings& warnings) {
+  MtlCleaner cleaner(path, read_whole_file(path, uint64_t{256} << 20), warnings);
+  std::istringstream in(cleaner.clean());
   std::map<std::string, int> indices;
   std::vector<tinyobj::material_t> found;
   std::string warning, error;
-  std::istringstream in(text);
   tinyobj::LoadMtl(&indices, &found, &in, &warning, &error);
   if (!error.empty()) throw FileError(path, trimmed(error));
-  for (const auto& mtl : found) {
-    const std::string name = trimmed(mtl.name);
-    const auto line = scan.lines.find(name);
-    if (name.empty() || line == scan.lines.end()) continue;  // keys before the first newmtl
-    const std::string user = fmt::format("material \"{}\"", shown(name));
+  for (size_t i = 0; i < cleaner.records().size(); ++i) {
+    const MtlRecord& record = cleaner.records()[i];
+    const auto& mtl = found.at(i);
+    const std::string user = fmt::format("material \"{}\"", shown(record.name));
+    const auto line_of = [&](const char* key) {
+      const auto line = record.lines.find(key);
+      return line == record.lines.end() ? record.line : line->second;
+    };
     lumicut_material m = default_material();
     bool clipped = false;
     for (int c = 0; c < 3; ++c) {
@@ -141,31 +299,46 @@ void read_mtl(const std::string& path, ObjModel& model, TextureStore& textures) 
       clipped |= mtl.diffuse[c] > 1.0f || mtl.specular[c] > 1.0f;
     }
     if (clipped)
-      model.warnings.push_back(
-          fmt::format("{}: {} reflects more than it receives; Kd and Ks are cut to 1", path, user));
+      warnings.add("materials that reflect more than they receive", path, record.line,
+                   fmt::format("{} reflects more than it receives; Kd and Ks are cut to 1", user));
     m.shininess = std::min(mtl.shininess, 1e6f);
     m.opacity = std::clamp(mtl.dissolve, kHole, 1.0f);
     if (mtl.illum == 7) {
       m.opacity = kHole;
-      model.warnings.push_back(
-          fmt::format("{}: {} is clear glass (illum 7): left out, light passes unchanged", path, user));
+      warnings.add("materials of clear glass", path, record.line,
+                   fmt::format("{} is clear glass (illum 7): left out, light passes unchanged", user));
     }
-    const auto texture = [&](const std::string& file, TextureUse use,
+    const auto texture = [&](const char* key, const std::string& name, TextureUse use,
                              const tinyobj::texture_option_t& options) -> int32_t {
-      if (file.empty()) return 0;
+      if (name.empty()) return 0;
       if (options.scale[0] != 1.0f || options.scale[1] != 1.0f || options.origin_offset[0] != 0.0f ||
           options.origin_offset[1] != 0.0f)
-        model.warnings.push_back(
-            fmt::format("{}: {}: the options -s and -o of {} are not read", path, user, shown(file)));
-      return textures.get(beside(path, file), use, texture_flags(options), fmt::format("{} ({})", user, path));
+        warnings.add("textures whose options -s and -o are not read", path, line_of(key),
+                     fmt::format("{}: the options -s and -o of {} are not read", user, shown(name)));
+      const FoundFile file = find_beside(path, name);
+      if (file.path.empty()) {
+        warnings.add("missing textures", path, line_of(key),
+                     fmt::format("{}: the texture {} does not exist; {}", user, shown(name),
+                                 use == TextureUse::mask ? "taken as opaque" : "grey stands in"));
+        return use == TextureUse::mask ? 0 : textures.grey();
+      }
+      if (!file.remark.empty())
+        warnings.add("names of textures that differ from their files'", path, line_of(key),
+                     fmt::format("{}: the texture {} does not exist; {}", user, shown(name), file.remark));
+      return textures.get(file.path, use, texture_flags(options), fmt::format("{} ({})", user, path));
     };
-    m.diffuse_texture = texture(mtl.diffuse_texname, TextureUse::colour, mtl.diffuse_texopt);
-    m.specular_texture = texture(mtl.specular_texname, TextureUse::colour, mtl.specular_texopt);
-    m.opacity_texture = texture(mtl.alpha_texname, TextureUse::mask, mtl.alpha_texopt);
-    m.emission_texture = texture(mtl.emissive_texname, TextureUse::colour, mtl.emissive_texopt);
-    for (const auto& known : model.materials)
-      if (known.name == name) throw FileError(path, fmt::format("the {} also stands in another MTL of this OBJ", user));
-    model.materials.push_back({name, m, line->second});
+    m.diffuse_texture = texture("map_Kd", mtl.diffuse_texname, TextureUse::colour, mtl.diffuse_texopt);
+    m.specular_texture = texture("map_Ks", mtl.specular_texname, TextureUse::colour, mtl.specular_texopt);
+    m.opacity_texture = texture("map_d", mtl.alpha_texname, TextureUse::mask, mtl.alpha_texopt);
+    m.emission_texture = texture("map_Ke", mtl.emissive_texname, TextureUse::colour, mtl.emissive_texopt);
+    const auto [known, is_new] = by_name.emplace(record.name, static_cast<uint32_t>(model.materials.size()));
+    if (is_new) {
+      model.materials.push_back({record.name, m});
+    } else {
+      warnings.add("materials that are defined again", path, record.line,
+                   fmt::format("{} is defined again; this definition counts", user));
+      model.materials[known->second].values = m;
+    }
   }
 }
 
@@ -177,19 +350,17 @@ struct Corner {
 
 class ObjReader {
  public:
-  ObjReader(const std::string& path, const ObjOptions& options, TextureStore& textures)
-      : path_(path), options_(options), textures_(textures), text_(read_whole_file(path)), buffer_(text_) {}
+  ObjReader(const std::string& path, const ObjOptions& options, TextureStore& textures, Warnings& warnings)
+      : path_(path),
+        options_(options),
+        textures_(textures),
+        warnings_(warnings),
+        text_(plain_text(read_whole_file(path), path)),
+        counter_(text_),
+        buffer_(text_) {}
 
   ObjModel read() {
-    struct Reader : tinyobj::MaterialReader {
-      ObjReader* self;
-      bool operator()(const std::string& file, std::vector<tinyobj::material_t>*, std::map<std::string, int>*,
-                      std::string*, std::string*) override {
-        self->on_mtllib(file);
-        return false;  // tinyobjloader shall not keep materials
-      }
-    } reader;
-    reader.self = this;
+    scan();
     tinyobj::callback_t callback;
     callback.vertex_cb = [](void* self, float x, float y, float z, float) {
       get(self).on_vector("v", 3, get(self).positions_, {x, y, z});
@@ -204,7 +375,7 @@ class ObjReader {
     callback.usemtl_cb = [](void* self, const char* name, int) { get(self).on_usemtl(name); };
     std::istream in(&buffer_);
     std::string warning, error;
-    tinyobj::LoadObjWithCallback(in, callback, this, &reader, &warning, &error);
+    tinyobj::LoadObjWithCallback(in, callback, this, nullptr, &warning, &error);
     if (!error.empty()) throw FileError(path_, trimmed(error));
     finish();
     return std::move(model_);
@@ -225,9 +396,57 @@ class ObjReader {
   };
   static constexpr uint32_t kNone = 0xffffffffu;
 
-  [[noreturn]] void fail(const std::string& text) const {
-    const auto line = buffer_.last_line();
-    throw FileError(path_, fmt::format("line {}: {} in \"{}\"", buffer_.line_number(line), text, shown(line)));
+  // A face before a vertex of its own.
+  struct EarlyFace {
+    std::vector<Corner> corners;
+    uint32_t material;
+    std::string_view line;
+  };
+
+  int line_number(std::string_view line) { return counter_.line(buffer_.offset(line)); }
+  [[noreturn]] void fail(std::string_view line, const std::string& text) {
+    throw FileError(path_, fmt::format("line {}: {} in \"{}\"", line_number(line), text, shown(line)));
+  }
+  [[noreturn]] void fail(const std::string& text) { fail(buffer_.last_line(), text); }
+  void warn(const char* kind, std::string_view line, const std::string& text) {
+    warnings_.add(kind, path_, line_number(line), text);
+  }
+
+  // What tinyobjloader would pass over in silence; and the materials, which may be used before they are named.
+  void scan() {
+    // Of no effect on a picture, or read by tinyobjloader.
+    static const std::set<std::string_view> kSilent = {"", "v", "vt", "vn", "vp", "f", "g", "o", "s", "mg", "usemtl"};
+    for (size_t begin = 0; begin < text_.size();) {
+      const size_t end = std::min(text_.find('\n', begin), text_.size());
+      const std::string_view line = std::string_view(text_).substr(begin, end - begin);
+      const auto [key, rest] = split_key(line);
+      const bool bare = rest.find_first_not_of(" \t") == std::string_view::npos;
+      begin = end + 1;
+      if (key.substr(0, 1) == "#") continue;
+      if (key == "f") blank_bare_slashes(buffer_.offset(line), line.size());
+      if (bare && (key == "v" || key == "vt" || key == "vn")) fail(line, "no numbers");
+      if (bare && (key == "f" || key == "usemtl"))
+        warn("statements that are not read", line, fmt::format("{} without anything is passed over", key));
+      else if (key == "mtllib")
+        on_mtllib(trimmed(rest), line);
+      else if (key == "l" || key == "p")
+        warn("lines and points", line, "lines and points are not shown");
+      else if (!kSilent.count(key))
+        warn("statements that are not read", line, fmt::format("\"{}\" is not read", shown(key)));
+      else
+        continue;
+      text_[buffer_.offset(line) + line.find_first_not_of(" \t")] = '#';
+    }
+    for (const auto& [name, number] : by_name_) in_lower_case_.emplace(lower(name), number);
+  }
+
+  // After "1/ 2/" tinyobjloader would take the 2 for the texture coordinate of 1.
+  void blank_bare_slashes(size_t begin, size_t size) {
+    bool blank = true;
+    for (size_t at = begin + size; at-- > begin;) {
+      if (blank && text_[at] == '/') text_[at] = ' ';
+      blank = text_[at] == ' ' || text_[at] == '\t';
+    }
   }
 
   void on_vector(const char* key, int least, std::vector<float>& list, std::initializer_list<float> values) {
@@ -253,29 +472,48 @@ class ObjReader {
     if (list.size() > kMaxCount) fail("too many vertices");
   }
 
-  void on_mtllib(const std::string& file) {
-    if (!options_.read_materials || !read_mtls_.insert(file).second) return;
-    const std::string path = beside(path_, trimmed(file));
-    if (!std::filesystem::is_regular_file(path))
-      fail(fmt::format("the material file {} does not exist (give the mesh a \"material\" in the scene to do without)",
-                       path));
-    read_mtl(path, model_, textures_);
+  // One name, which may hold spaces, or several.
+  void on_mtllib(const std::string& rest, std::string_view line) {
+    if (!options_.read_materials) return;
+    std::vector<std::string> names = {rest};
+    if (find_beside(path_, rest).path.empty()) {
+      std::istringstream words(rest);
+      std::vector<std::string> several{std::istream_iterator<std::string>(words), {}};
+      const auto exists = [&](const std::string& name) { return !find_beside(path_, name).path.empty(); };
+      if (std::any_of(several.begin(), several.end(), exists)) names = std::move(several);
+    }
+    for (const auto& name : names) {
+      const FoundFile file = find_beside(path_, name);
+      if (file.path.empty())
+        warn("missing material files", line, fmt::format("the material file {} does not exist", shown(name)));
+      else if (!file.remark.empty())
+        warn("names of material files that differ from their files'", line,
+             fmt::format("the material file {} does not exist; {}", shown(name), file.remark));
+      if (!file.path.empty() && read_mtls_.insert(file.path).second)
+        read_mtl(file.path, model_, by_name_, textures_, warnings_);
+    }
   }
 
   void on_usemtl(const char* raw_name) {
     if (!options_.read_materials) return;
     const std::string name = trimmed(raw_name);
-    for (size_t i = 0; i < model_.materials.size(); ++i) {
-      if (model_.materials[i].name == name) {
-        material_ = static_cast<uint32_t>(i);
-        return;
-      }
+    auto found = by_name_.find(name);
+    if (found == by_name_.end()) {
+      const auto [first, last] = in_lower_case_.equal_range(lower(name));
+      const bool one = first != last && std::next(first) == last;
+      warn("unknown materials", buffer_.last_line(),
+           fmt::format("the material \"{}\" stands in no MTL of this file; {}", shown(name),
+                       one ? fmt::format("\"{}\" is taken in its place", shown(model_.materials[first->second].name))
+                           : "grey stands in"));
+      const auto number = one ? first->second : static_cast<uint32_t>(model_.materials.size());
+      if (!one) model_.materials.push_back({name, default_material()});
+      found = by_name_.emplace(name, number).first;
     }
-    fail(fmt::format("the material \"{}\" stands in no MTL of this file", shown(name)));
+    material_ = found->second;
   }
 
   // tinyobjloader's numbers wrap around, and end at the first strange character.
-  void check_face_line() const {
+  void check_face_line() {
     const auto line = buffer_.last_line();
     int digits = 0;
     for (size_t at = line.find('f') + 1; at < line.size() && line[at] != '#'; ++at) {
@@ -287,50 +525,65 @@ class ObjReader {
     }
   }
 
-  int64_t resolve(int index, size_t count, const char* what) const {
+  // 0-based. Positive ones may name what follows; `early` then.
+  int64_t resolve(int index, size_t count, const char* what, bool& early) {
     const auto n = static_cast<int64_t>(count);
     const int64_t resolved = index > 0 ? int64_t{index} - 1 : n + index;
-    // Vertices must stand before the faces that use them, as every writer has it.
-    if (index == 0 || resolved < 0 || resolved >= n)
-      fail(fmt::format("{} index {} is out of range ({} so far)", what, index, n));
+    if (index == 0 || resolved < 0) fail(fmt::format("{} index {} is out of range ({} so far)", what, index, n));
+    early |= resolved >= n;
     return resolved;
   }
 
   void on_face(const tinyobj::index_t* corners, int count) {
-    if (count < 3) fail(fmt::format("a face of {} corners", count));
     if (static_cast<size_t>(count) > kMaxCorners)
       fail(fmt::format("a face of {} corners; at most {} are read", count, kMaxCorners));
     check_face_line();
-    polygon_.clear();
-    bool smooth = true;
+    bool early = false;
+    std::vector<Corner>& polygon = polygon_;
+    polygon.clear();
     for (int i = 0; i < count; ++i) {
-      Corner c{resolve(corners[i].vertex_index, positions_.size() / 3, "vertex"), -1, -1};
+      Corner c{resolve(corners[i].vertex_index, positions_.size() / 3, "vertex", early), -1, -1};
       if (corners[i].texcoord_index != 0)
-        c.uv = resolve(corners[i].texcoord_index, uvs_.size() / 2, "texture coordinate");
-      if (corners[i].normal_index != 0) c.normal = resolve(corners[i].normal_index, normals_.size() / 3, "normal");
-      smooth = smooth && c.normal >= 0 && length2(&normals_[static_cast<size_t>(c.normal) * 3]) > 1e-12f;
-      polygon_.push_back(c);
+        c.uv = resolve(corners[i].texcoord_index, uvs_.size() / 2, "texture coordinate", early);
+      if (corners[i].normal_index != 0)
+        c.normal = resolve(corners[i].normal_index, normals_.size() / 3, "normal", early);
+      polygon.push_back(c);
+    }
+    if (count < 3) {
+      warn("faces of less than three corners", buffer_.last_line(), "a face of less than three corners is left out");
+      return;
     }
     if (material_ == kNone) material_ = plain_material();
+    if (early) {
+      early_faces_.push_back({polygon, material_, buffer_.last_line()});
+    } else {
+      add_polygon(polygon, material_);
+    }
+  }
+
+  void add_polygon(const std::vector<Corner>& polygon, uint32_t material) {
+    const bool smooth = std::all_of(polygon.begin(), polygon.end(), [&](const Corner& c) {
+      return c.normal >= 0 && length2(&normals_[static_cast<size_t>(c.normal) * 3]) > 1e-12f;
+    });
     Part& part = parts_[smooth ? 1 : 0];
     part.smooth = smooth;
-    if (count == 3) {
-      add_triangle(part, 0, 1, 2);
+    if (polygon.size() == 3) {
+      add_triangle(part, material, polygon[0], polygon[1], polygon[2]);
       return;
     }
     corner_positions_.clear();
-    for (const auto& c : polygon_)
+    for (const auto& c : polygon)
       for (size_t k = 0; k < 3; ++k) corner_positions_.push_back(positions_[static_cast<size_t>(c.position) * 3 + k]);
     const auto triangles = triangulate_polygon(corner_positions_);
     for (size_t t = 0; t < triangles.size(); t += 3)
-      add_triangle(part, triangles[t], triangles[t + 1], triangles[t + 2]);
+      add_triangle(part, material, polygon[triangles[t]], polygon[triangles[t + 1]], polygon[triangles[t + 2]]);
   }
 
   static float length2(const float* v) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
 
-  void add_triangle(Part& part, size_t a, size_t b, size_t c) {
-    for (const size_t k : {a, b, c}) part.mesh.indices.push_back(vertex(part, polygon_[k]));
-    part.mesh.materials.push_back(material_);
+  void add_triangle(Part& part, uint32_t material, const Corner& a, const Corner& b, const Corner& c) {
+    for (const Corner* corner : {&a, &b, &c}) part.mesh.indices.push_back(vertex(part, *corner));
+    part.mesh.materials.push_back(material);
   }
 
   uint32_t vertex(Part& part, const Corner& corner) {
@@ -338,7 +591,8 @@ class ObjReader {
     const auto uv = static_cast<uint32_t>(corner.uv);
     const auto normal = part.smooth ? static_cast<uint32_t>(corner.normal) : kNone;
     if (part.head.size() <= position) part.head.resize(std::max(positions_.size() / 3, position + 1), kNone);
-    for (uint32_t i = part.head[position]; i != kNone; i = part.vertices[i].next)
+    uint32_t length = 0;
+    for (uint32_t i = part.head[position]; i != kNone && length < kMaxChain; i = part.vertices[i].next, ++length)
       if (part.vertices[i].uv == uv && part.vertices[i].normal == normal) return i;
     const auto index = static_cast<uint32_t>(part.vertices.size());
     part.vertices.push_back({uv, normal, part.head[position]});
@@ -359,11 +613,24 @@ class ObjReader {
   // Faces before the first usemtl.
   uint32_t plain_material() {
     if (!options_.read_materials) return 0;
-    model_.materials.push_back({"", default_material(), 0});
+    model_.materials.push_back({"", default_material()});
     return static_cast<uint32_t>(model_.materials.size() - 1);
   }
 
   void finish() {
+    for (const EarlyFace& face : early_faces_) {
+      const auto check = [&](int64_t index, size_t count, const char* what) {
+        if (index >= static_cast<int64_t>(count))
+          fail(face.line, fmt::format("{} index {} is out of range ({} in the file)", what, index + 1, count));
+      };
+      for (const Corner& c : face.corners) {
+        check(c.position, positions_.size() / 3, "vertex");
+        check(c.uv, uvs_.size() / 2, "texture coordinate");
+        check(c.normal, normals_.size() / 3, "normal");
+      }
+      warn("faces before their vertices", face.line, "the face stands before its vertices");
+      add_polygon(face.corners, face.material);
+    }
     for (auto& part : parts_) {
       if (part.mesh.indices.empty()) continue;
       if (uvs_.empty()) part.mesh.uvs.clear();
@@ -375,14 +642,19 @@ class ObjReader {
   std::string path_;
   ObjOptions options_;
   TextureStore& textures_;
+  Warnings& warnings_;
   std::string text_;
+  LineCounter counter_;
   LineBuffer buffer_;
   ObjModel model_;
   std::vector<float> positions_, normals_, uvs_;
   std::vector<Corner> polygon_;
+  std::vector<EarlyFace> early_faces_;
   std::vector<float> corner_positions_;
   Part parts_[2];  // flat, smooth
   uint32_t material_ = kNone;
+  std::map<std::string, uint32_t> by_name_;             // into model_.materials
+  std::multimap<std::string, uint32_t> in_lower_case_;  // those of the MTLs
   std::set<std::string> read_mtls_;
 };
 
@@ -434,8 +706,8 @@ std::vector<uint32_t> triangulate_polygon(const std::vector<float>& points) {
   return triangles;
 }
 
-ObjModel read_obj(const std::string& path, const ObjOptions& options, TextureStore& textures) {
-  return ObjReader(path, options, textures).read();
+ObjModel read_obj(const std::string& path, const ObjOptions& options, TextureStore& textures, Warnings& warnings) {
+  return ObjReader(path, options, textures, warnings).read();
 }
 
 }  // namespace lumicut::io

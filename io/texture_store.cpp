@@ -89,4 +89,17 @@ int32_t TextureStore::get(const std::string& path, TextureUse use, uint32_t flag
   return known_[key] = static_cast<int32_t>(textures_.size());
 }
 
+int32_t TextureStore::grey() {
+  int32_t& index = known_["grey"];
+  if (index == 0) {
+    Texture texture;
+    texture.file = "grey";
+    texture.width = texture.height = 1, texture.channels = 3;
+    texture.floats = {0.5f, 0.5f, 0.5f};
+    textures_.push_back(std::move(texture));
+    index = static_cast<int32_t>(textures_.size());
+  }
+  return index;
+}
+
 }  // namespace lumicut::io

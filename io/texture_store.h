@@ -22,6 +22,8 @@ class TextureStore {
   explicit TextureStore(std::vector<Texture>& textures) : textures_(textures) {}
   // 1 + index into the textures. `user` names who asks, for the error: "material \"leaf\"". Throws FileError.
   int32_t get(const std::string& path, TextureUse use, uint32_t flags, const std::string& user);
+  // The same for a texture that is missing: one pixel of .5, linear.
+  int32_t grey();
 
  private:
   std::vector<Texture>& textures_;

@@ -21,6 +21,7 @@ namespace {
 
 const std::vector<std::string> kErrorMeasures = {
     "rmse", "rmse_display", "lmse", "mean_relative_error", "p95_relative_error", "p99_relative_error", "mrse"};
+constexpr size_t kMaxRuns = 10000, kMaxGroups = 100000;  // far more than anyone waits for
 const std::vector<std::string> kTimeMeasures = {"render_seconds", "total_seconds"};
 
 class PlanReader {
@@ -105,13 +106,14 @@ class PlanReader {
     const auto value = object.find(key);
     if (!value) return;
     into.clear();
+    std::set<int64_t> known;
     if (!value->raw().is_array()) {
       into.push_back(value->integer(least, most));
       return;
     }
     for (const JsonValue& v : value->elements()) {
       into.push_back(v.integer(least, most));
-      if (std::count(into.begin(), into.end(), into.back()) > 1) v.fail("stands twice");
+      if (!known.insert(into.back()).second) v.fail("stands twice");
     }
     if (into.empty()) value->fail("is empty");
   }
@@ -165,9 +167,11 @@ class PlanReader {
       }
       object.finish();
     }
-    for (const BenchScene& other : plan_.scenes)
-      if (file_name_of(other.name) == file_name_of(s.name))
-        value.fail(fmt::format("is another scene called \"{}\": give it a \"name\"", s.name));
+    if (!scene_names_.insert(file_name_of(s.name)).second)
+      value.fail(fmt::format("is another scene called \"{}\": give it a \"name\"", s.name));
+    groups_ += std::max<size_t>(s.samples.size(), 1) * s.vpls.size() * s.seeds.size();
+    if (groups_ > kMaxGroups)
+      value.fail(fmt::format("makes more than {} combinations of \"samples\", \"vpls\" and \"seeds\"", kMaxGroups));
     plan_.scenes.push_back(s);
   }
 
@@ -180,9 +184,8 @@ class PlanReader {
   }
 
   void known_run(const JsonValue& where, const std::string& name) const {
-    std::vector<std::string> names;
-    for (const BenchRun& r : plan_.runs) names.push_back(r.name);
-    if (std::find(names.begin(), names.end(), name) != names.end()) return;
+    if (run_names_.count(name) > 0) return;
+    const std::vector<std::string> names(run_names_.begin(), run_names_.end());
     const std::string near = io::nearest_word(name, names);
     where.fail(fmt::format("is \"{}\", but no run before has that name{}", name,
                            near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)));
@@ -205,12 +208,14 @@ class PlanReader {
         const bool sweep = v.raw().is_array();
         const std::vector<JsonValue> values = sweep ? v.elements() : std::vector<JsonValue>{v};
         if (values.empty()) v.fail("is empty");
+        if (values.size() > kMaxRuns / all.size())
+          v.fail(fmt::format("makes more than {} runs with the lists beside it", kMaxRuns));
+        for (const JsonValue& one : values) check_parameter(one, r.integrator, name, text_of(one));
         std::vector<BenchRun> next;
         for (const BenchRun& base : all)
           for (const JsonValue& one : values) {
             next.push_back(base);
             const std::string text = text_of(one);
-            check_parameter(one, r.integrator, name, text);
             next.back().parameters[name] = text;
             if (sweep) next.back().name += fmt::format(" {}={}", name, text);
           }
@@ -222,10 +227,12 @@ class PlanReader {
     }
     object.finish();
     for (const BenchRun& one : all) {
-      for (const BenchRun& other : plan_.runs)
-        if (file_name_of(other.name) == file_name_of(one.name))
-          value.fail(fmt::format("is another run called \"{}\": give it a \"name\"", one.name));
+      if (!run_files_.insert(file_name_of(one.name)).second)
+        value.fail(fmt::format("is another run called \"{}\": give it a \"name\"", one.name));
       plan_.runs.push_back(one);
+      run_names_.insert(one.name);
+      if (plan_.runs.size() > kMaxRuns)
+        value.fail(fmt::format("is more than the {} runs that a plan may have", kMaxRuns));
     }
   }
 
@@ -295,6 +302,9 @@ class PlanReader {
   std::vector<std::string> integrators_;
   BenchScene usual_;
   BenchPlan plan_;
+  std::set<std::string> scene_names_, run_files_;  // as names of files
+  std::set<std::string> run_names_;
+  size_t groups_ = 0;
 };
 
 }  // namespace

@@ -48,6 +48,7 @@ struct BenchPlan {
   std::string file, name, description, accel = "embree", rays = "robust", baseline;
   int threads = 0, repeat = 1, amortise_views = 10;
   bool keep_images = true, yardstick = false;
+  bool strict = false;  // of the command alone: warnings of scenes are errors
   std::vector<BenchScene> scenes;
   std::vector<BenchRun> runs;
 };

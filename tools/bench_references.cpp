@@ -44,6 +44,7 @@ std::vector<std::string> BenchGroup::arguments() const {
                                   plan->rays,
                                   "--threads",
                                   std::to_string(plan->threads)};
+  if (plan->strict) all.emplace_back("--strict");
   const auto add = [&](const std::string& option, const std::string& value) {
     all.push_back(option);
     all.push_back(value);

@@ -36,7 +36,7 @@ struct Options {
   std::vector<int64_t> vpls, seeds, samples;
   int threads = -1, repeat = 0;
   int64_t squares = -1;
-  bool resume = false, overwrite = false, quiet = false, check = false;
+  bool resume = false, overwrite = false, quiet = false, check = false, strict = false;
 };
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
@@ -153,6 +153,7 @@ class BenchCommand {
     } else {
       plan_ = read_bench_plan(o_.plan, api());
     }
+    plan_.strict = o_.strict;
     if (o_.threads >= 0) plan_.threads = o_.threads;
     if (!o_.accel.empty()) plan_.accel = o_.accel;
     if (o_.repeat > 0) plan_.repeat = o_.repeat;
@@ -611,6 +612,7 @@ void add_bench(CLI::App& app) {
   auto* resume = command->add_flag("--resume", o->resume, "Go on with what stands in the folder");
   command->add_flag("--overwrite", o->overwrite, "Begin anew, though results stand in the folder")->excludes(resume);
   command->add_flag("--check", o->check, "Read the plan and say whether it is good; run nothing");
+  command->add_flag("--strict", o->strict, "Take what is only warned of in scenes as an error");
   command->add_flag("-q,--quiet", o->quiet, "No progress, and no tables on the terminal");
   command->footer(
       "Example: lumicut bench bench/plans/quick.json -o out/quick && lumicut report out/quick/results.json");

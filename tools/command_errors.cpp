@@ -112,7 +112,7 @@ class ErrorsCommand {
     bar_.show("reading files", 0, 0);
     const io::SceneData data = io::read_scene(o_.scene);
     bar_.wipe();
-    for (const auto& warning : data.warnings) fmt::print(stderr, "lumicut: warning: {}\n", warning);
+    tell_warnings(data.warnings, o_.scene, o_.strict);
     stop_if_interrupted();
     io::upload_scene(api(), scene_.get(), data);
     bar_.show("acceleration structure", 0, 0);

@@ -122,6 +122,7 @@ class FlythroughCommand {
       if (!path.empty()) io::AtomicFile file(path);
     create();
     const io::SceneData data = io::read_scene(o_.scene);
+    tell_warnings(data.warnings, o_.scene, o_.strict);
     const auto cameras = read_cameras(o_.cameras, data.camera);
     io::upload_scene(api(), scene_.get(), data);
     set_host_lights();

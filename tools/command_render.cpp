@@ -164,8 +164,8 @@ class RenderCommand {
     bar_.show("reading files", 0, 0);
     io::SceneData data = io::read_scene(o_.scene);
     bar_.wipe();
-    if (o_.verbosity == 1)  // above that they are told with all else
-      for (const auto& warning : data.warnings) fmt::print(stderr, "lumicut: warning: {}\n", warning);
+    if (o_.verbosity == 1 || o_.strict)  // above that they are told with all else
+      tell_warnings(data.warnings, o_.scene, o_.strict);
     stop_if_interrupted();
     io::upload_scene(api(), scene_.get(), data);
     triangles_ = data.triangle_count();

@@ -165,7 +165,7 @@ class Examiner {
       : api_(api), device_(device), scene_(scene), o_(options) {}
 
   Preflight run() {
-    p_.approximated = scene_.warnings;
+    p_.approximated = scene_.warnings.lines();
     for (const auto& texture : scene_.textures) means_.push_back(texture_mean(texture, false));
     for (uint32_t m = 0; m < scene_.meshes.size(); ++m) shells_.push_back(find_shells(scene_, m));
     measure();

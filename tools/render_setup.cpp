@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/file_error.h"
 #include "tools/commands.h"
 #include "tools/interrupt_watcher.h"
 
@@ -23,6 +24,12 @@ void add_setup_options(CLI::App& command, RenderSetup& setup) {
   command.add_option("--rays", setup.rays, "robust: none slips between two triangles; fast: some may, in less time")
       ->check(CLI::IsMember({"robust", "fast"}))
       ->capture_default_str();
+  command.add_flag("--strict", setup.strict, "Take what is only warned of in files as an error");
+}
+
+void tell_warnings(const io::Warnings& warnings, const std::string& file, bool strict) {
+  for (const auto& warning : warnings.lines()) fmt::print(stderr, "lumicut: warning: {}\n", warning);
+  if (strict && !warnings.empty()) throw io::FileError(file, "has warnings, which --strict takes as errors");
 }
 
 void create_device(const io::Api& api, const RenderSetup& setup, io::Handle<lumicut_device>& device) {

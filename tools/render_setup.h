@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "io/library.h"
+#include "io/warnings.h"
 
 namespace CLI {
 class App;
@@ -21,10 +22,15 @@ struct RenderSetup {
   std::vector<std::string> parameters;  // name=value
   std::optional<uint64_t> vpls, seed;
   int threads = 0;
+  bool strict = false;
 };
 
-// -i, -p, --vpls, --seed, --threads, --accel, --rays.
+// -i, -p, --vpls, --seed, --threads, --accel, --rays, --strict.
 void add_setup_options(CLI::App& command, RenderSetup& setup);
+
+// Prints on standard error what was noticed while the scene of that file was read; throws FileError when `strict` and
+// there is anything.
+void tell_warnings(const io::Warnings& warnings, const std::string& file, bool strict);
 
 void create_device(const io::Api& api, const RenderSetup& setup, io::Handle<lumicut_device>& device);
 // Builds what rays need of the scene of that file; Ctrl-C ends it.

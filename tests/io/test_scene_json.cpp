@@ -450,8 +450,8 @@ TEST(SceneJson, ScenesOfTheBenchesAreWellFormed) {
 
 TEST(SceneJson, ASceneWithoutLightWarns) {
   const SceneData scene = changed([](json& s) { s.erase("lights"); });
-  ASSERT_EQ(scene.warnings.size(), 1u);
-  expect_in(scene.warnings[0], {"no light"});
+  ASSERT_EQ(scene.warnings.lines().size(), 1u);
+  expect_in(scene.warnings.lines()[0], {"no light"});
 }
 
 TEST(SceneJson, OurOwnScenesAreRead) {
@@ -460,7 +460,7 @@ TEST(SceneJson, OurOwnScenesAreRead) {
   for (const char* name : {"cornell_box", "indirect_room", "court"}) {
     const SceneData scene = read_scene(std::string(root) + "/reference_images/" + name + "/" + name + ".json");
     EXPECT_GT(scene.triangle_count(), 20u) << name;
-    EXPECT_TRUE(scene.warnings.empty()) << name << ": " << scene.warnings[0];
+    EXPECT_TRUE(scene.warnings.empty()) << name << ": " << scene.warnings.lines()[0];
   }
 }
 

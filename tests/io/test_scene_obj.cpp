@@ -1,6 +1,7 @@
 #include "io/scene_obj.h"
 
 #include <cmath>
+#include <ctime>
 #include <sstream>
 
 #include "io/image_file.h"
@@ -9,10 +10,18 @@
 namespace lumicut::io {
 namespace {
 
-ObjModel read(const std::string& path, bool materials = true) {
+struct Read : ObjModel {
   std::vector<Texture> textures;
-  TextureStore store(textures);
-  return read_obj(path, {.read_materials = materials}, store);
+  std::vector<std::string> warnings;
+};
+
+Read read(const std::string& path, bool materials = true) {
+  Read all;
+  TextureStore store(all.textures);
+  Warnings warnings;
+  static_cast<ObjModel&>(all) = read_obj(path, {.read_materials = materials}, store, warnings);
+  all.warnings = warnings.lines();
+  return all;
 }
 
 const char kTriangle[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
@@ -111,10 +120,8 @@ TEST(SceneObj, TexturesBecomeColoursAndMasks) {
   write_png(folder / "rgb.png", {255, 0, 0, 0, 255, 0}, 2, 1, 3);
   write_png(folder / "grey.png", {7, 9}, 2, 1, 1);
   folder.write("m.mtl", "newmtl red\nmap_Kd rgb.png\nmap_d .\\grey.png\n\nnewmtl again\nmap_Kd rgb.png\n");
-  std::vector<Texture> textures;
-  TextureStore store(textures);
-  const auto model =
-      read_obj(folder.write("a.obj", "mtllib m.mtl\n" + std::string(kTriangle) + "usemtl red\nf 1 2 3\n"), {}, store);
+  const auto model = read(folder.write("a.obj", "mtllib m.mtl\n" + std::string(kTriangle) + "usemtl red\nf 1 2 3\n"));
+  const auto& textures = model.textures;
   ASSERT_EQ(textures.size(), 2u) << "a texture is read once";
   const auto& red = model.materials[0].values;
   const Texture& colour = textures[static_cast<size_t>(red.diffuse_texture - 1)];
@@ -139,7 +146,7 @@ TEST(SceneObj, WrongNumbersNameTheLine) {
 }
 
 TEST(SceneObj, WrongFacesNameTheLineAndTheIndex) {
-  expect_in(error("f 1 2 4\n"), {"line 4", "vertex index 4 is out of range (3 so far)"});
+  expect_in(error("f 1 2 4\n"), {"line 4", "vertex index 4 is out of range (3 in the file)"});
   expect_in(error("f 1 2 0\n"), {"line 4", "vertex index 0"});
   expect_in(error("f -4 1 2\n"), {"line 4", "vertex index -4"});
   expect_in(error("f 1 2 99999999999999999999\n"), {"line 4", "out of range"});
@@ -148,7 +155,6 @@ TEST(SceneObj, WrongFacesNameTheLineAndTheIndex) {
   expect_in(error("f 1.5 2 3\n"), {"line 4", "'.'"});
   expect_in(error("f 1/1 2/1 3/1\n"), {"line 4", "texture coordinate index 1"});
   expect_in(error("f 1//1 2//1 3//1\n"), {"line 4", "normal index 1"});
-  expect_in(error("f 1 2\n"), {"line 4", "a face of 2 corners"});
   expect_in(error("f a b c\n"), {"line 4", "'a'"});
   std::string large = "f";
   for (int i = 0; i < 2000; ++i) large += " 1";
@@ -157,16 +163,13 @@ TEST(SceneObj, WrongFacesNameTheLineAndTheIndex) {
 }
 
 TEST(SceneObj, WrongMaterialsAreNamed) {
-  expect_in(error("mtllib none.mtl\nf 1 2 3\n"), {"line 4", "none.mtl", "does not exist"});
-  expect_in(error("mtllib m.mtl\nusemtl blue\nf 1 2 3\n"), {"line 5", "\"blue\"", "in no MTL"});
   expect_in(mtl_error("newmtl red\nKd nan 0 0\n"), {"m.mtl", "line 2", "\"nan\" of Kd"});
   expect_in(mtl_error("newmtl red\nKd 1 2 x\n"), {"m.mtl", "line 2", "\"x\""});
-  expect_in(mtl_error("newmtl red\nKe 1 -2 1\n"), {"line 2", "Ke is -2"});
+  expect_in(mtl_error("newmtl red\nKd 0x10 1 1\n"), {"m.mtl", "line 2", "\"0x10\""});
+  expect_in(mtl_error("newmtl red\nKd 1 1\n"), {"m.mtl", "line 2", "2 numbers instead of 1 or 3"});
+  expect_in(mtl_error("newmtl red\nd -2\n"), {"line 2", "d is -2"});
   expect_in(mtl_error("newmtl red\nNs\n"), {"line 2", "Ns without a number"});
-  expect_in(mtl_error("newmtl red\nnewmtl red\n"), {"line 2", "\"red\" stands twice"});
   expect_in(mtl_error("newmtl\n"), {"line 1", "without a name"});
-  expect_in(mtl_error("newmtl red\nmap_Kd no.png\n"), {"no.png", "no such texture", "material \"red\"", "m.mtl"});
-  expect_in(mtl_error(""), {"line 5", "\"red\"", "in no MTL"});
   const TemporaryFolder folder;
   folder.write("bad.png", "this is not an image");
   folder.write("m.mtl", "newmtl red\nmap_Kd bad.png\n");
@@ -191,6 +194,224 @@ TEST(SceneObj, LineEndsOfAllSystemsAreRead) {
     expect_in(error_of([&] { read(folder.write("a.obj", text + "f 1 2 9" + end)); }), {"line 6", "index 9"});
     expect_in(error_of([&] { read(folder.write("a.obj", text + "f 1 2 9")); }), {"line 6", "index 9"});
   }
+}
+
+// ---- Untidy files ----
+
+// A triangle of material `red` whose MTL is `mtl`.
+Read with_mtl(const TemporaryFolder& folder, const std::string& mtl) {
+  folder.write("m.mtl", mtl);
+  return read(folder.write("a.obj", "mtllib m.mtl\n" + std::string(kTriangle) + "usemtl red\nf 1 2 3\n"));
+}
+
+void expect_one_warning(const Read& model, std::initializer_list<const char*> parts) {
+  ASSERT_EQ(model.warnings.size(), 1u) << testing::PrintToString(model.warnings);
+  expect_in(model.warnings[0], parts);
+}
+
+TEST(UntidyObj, WithoutItsMaterialsAMeshIsGrey) {
+  const TemporaryFolder folder;
+  const auto model = read(folder.write(
+      "a.obj", "mtllib none.mtl\n" + std::string(kTriangle) + "usemtl red\nf 1 2 3\nusemtl red\nf 1 2 3\n"));
+  ASSERT_EQ(model.materials.size(), 1u);
+  EXPECT_EQ(model.materials[0].name, "red");
+  EXPECT_EQ(model.materials[0].values.diffuse[1], 0.5f);
+  ASSERT_EQ(model.warnings.size(), 2u) << "a material is named once";
+  expect_in(model.warnings[0], {"a.obj: line 1: ", "none.mtl", "does not exist"});
+  expect_in(model.warnings[1], {"a.obj: line 5: ", "\"red\"", "in no MTL", "grey"});
+}
+
+TEST(UntidyObj, AMissingTextureIsGrey) {
+  const TemporaryFolder folder;
+  const auto model = with_mtl(folder, "newmtl red\nKd 1 1 1\nmap_Kd no.png\nmap_Ks no.png\nmap_d no.png\n");
+  ASSERT_EQ(model.textures.size(), 1u) << "one stands in for all";
+  EXPECT_EQ(model.textures[0].floats, (std::vector<float>{0.5f, 0.5f, 0.5f}));
+  EXPECT_EQ(model.materials[0].values.diffuse_texture, 1);
+  EXPECT_EQ(model.materials[0].values.specular_texture, 1);
+  EXPECT_EQ(model.materials[0].values.opacity_texture, 0) << "what has no mask is opaque";
+  ASSERT_EQ(model.warnings.size(), 3u);
+  expect_in(model.warnings[0], {"m.mtl: line 3: ", "no.png", "material \"red\"", "grey stands in"});
+}
+
+TEST(UntidyObj, TheLastOfTwoDefinitionsCounts) {
+  const TemporaryFolder folder;
+  folder.write("n.mtl", "newmtl red\nKd 0 0 1\n");
+  const auto again = with_mtl(folder, "newmtl red\nKd 1 0 0\nnewmtl red\nKd 0 1 0\n");
+  ASSERT_EQ(again.materials.size(), 1u);
+  EXPECT_EQ(again.materials[0].values.diffuse[1], 1.0f);
+  expect_one_warning(again, {"m.mtl: line 3: ", "\"red\" is defined again"});
+  folder.write("m.mtl", "newmtl red\nKd 1 0 0\n");
+  const auto other = read(folder.write(
+      "a.obj", "mtllib m.mtl\nmtllib m.mtl\nmtllib n.mtl\n" + std::string(kTriangle) + "usemtl red\nf 1 2 3\n"));
+  EXPECT_EQ(other.materials[0].values.diffuse[2], 1.0f);
+  expect_one_warning(other, {"n.mtl: line 1: ", "\"red\" is defined again"});
+}
+
+TEST(UntidyObj, NamesMayHoldSpacesAndLettersOfAnyKind) {
+  const TemporaryFolder folder;
+  write_png(folder / "caf\xc3\xa9 au lait.png", {1, 2, 3}, 1, 1, 3);
+  folder.write("\xe5\x8d\x97 wall.mtl", "newmtl  brick wall \nKd 1 0 0\nmap_Kd -s 1 1 1 caf\xc3\xa9 au lait.png \n");
+  const auto model =
+      read(folder.write("r\xc3\xa4ume/../a.obj", "mtllib \xe5\x8d\x97 wall.mtl\t\n" + std::string(kTriangle) +
+                                                     "usemtl brick wall\t\nf 1 2 3\n"));
+  EXPECT_TRUE(model.warnings.empty()) << testing::PrintToString(model.warnings);
+  EXPECT_EQ(model.materials.at(0).values.diffuse_texture, 1);
+  EXPECT_EQ(model.textures.at(0).bytes, (std::vector<uint8_t>{1, 2, 3}));
+  folder.write("a.mtl", "newmtl a\n"), folder.write("b.mtl", "newmtl b\n");
+  EXPECT_EQ(read(folder.write("a.obj", "mtllib a.mtl b.mtl\n" + std::string(kTriangle) + "f 1 2 3\n")).materials.size(),
+            3u)
+      << "two files in one line, and the material of faces without one";
+}
+
+TEST(UntidyObj, AByteOrderMarkIsPassedOver) {
+  const TemporaryFolder folder;
+  folder.write("m.mtl", "\xef\xbb\xbfnewmtl red\nKd 1 0 0\n");
+  const auto model =
+      read(folder.write("a.obj", "\xef\xbb\xbfv 0 0 0\nv 1 0 0\nv 0 1 0\nmtllib m.mtl\nusemtl red\nf 1 2 3\n"));
+  EXPECT_EQ(model.meshes.at(0).indices.size(), 3u);
+  EXPECT_EQ(model.materials.size(), 1u);
+  EXPECT_TRUE(model.warnings.empty());
+  expect_in(error_of([&] { read(folder.write("b.obj", "\xff\xfev\0 \0")); }), {"b.obj", "UTF-16"});
+}
+
+TEST(UntidyObj, ContinuedLinesAreOneAndKeepTheirNumbers) {
+  const TemporaryFolder folder;
+  folder.write("m.mtl", "newmtl red\nKd \\\n1 0 \\\r\n0.25\nKs x\n");
+  for (const char* end : {"\n", "\r\n", "\r"}) {
+    std::string text;
+    for (const char* line : {"# no line goes on after a comment \\", "v 0 0 \\", "0", "v 1 0 0", "v 0 1 0", "v 1 1 0",
+                             "f 1 2 \\", "  4 \\ ", "  3"})
+      text += line + std::string(end);
+    EXPECT_EQ(read(folder.write("a.obj", text)).meshes.at(0).indices.size(), 6u) << "a quad";
+    expect_in(error_of([&] { read(folder.write("a.obj", text + "f 1 2 9" + end)); }), {"line 10", "index 9"});
+  }
+  expect_in(error_of([&] { with_mtl(folder, "newmtl red\nKd \\\n1 0 \\\r\n0.25\nKs x\n"); }),
+            {"line 5", "\"x\" of Ks"});
+  EXPECT_EQ(with_mtl(folder, "newmtl red\nKd \\\n1 0 \\\r\n0.25\n").materials[0].values.diffuse[2], 0.25f);
+}
+
+TEST(UntidyObj, LinesAndPointsAmongFacesAreNotShown) {
+  const TemporaryFolder folder;
+  const auto model = read(folder.write(
+      "a.obj", std::string(kTriangle) + "l 1 2\np 1\nf 1 2 3\nf 1 2\nf 3\nf\no empty\ng a b\ns off\nusemtl\n"));
+  EXPECT_EQ(model.meshes.at(0).indices.size(), 3u);
+  ASSERT_EQ(model.warnings.size(), 6u) << testing::PrintToString(model.warnings);
+  expect_in(model.warnings[0], {"a.obj: line 4: ", "lines and points"});
+  expect_in(model.warnings[4], {"a.obj: line 7: ", "less than three corners"});
+}
+
+TEST(UntidyObj, StatementsThatAreNotReadAreTold) {
+  const TemporaryFolder folder;
+  expect_one_warning(read(folder.write("a.obj", std::string(kTriangle) + "f 1 2 3\ncurv 0 1 1 2\n")),
+                     {"a.obj: line 5: ", "\"curv\" is not read"});
+  expect_in(error("v\nf 1 2 3\n"), {"line 4", "no numbers"});
+}
+
+TEST(UntidyObj, FacesMayStandBeforeTheirVerticesAndMaterials) {
+  const TemporaryFolder folder;
+  folder.write("m.mtl", "newmtl red\nKd 1 0 0\n");
+  const auto model = read(folder.write(
+      "a.obj", "usemtl red\nf 1//1 2//1 3//1\nv 9 9 9\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf -1 -2 -3\nmtllib m.mtl\n"));
+  ASSERT_EQ(model.meshes.size(), 2u);
+  EXPECT_EQ(model.meshes[1].positions[0], 9.0f);
+  EXPECT_EQ(model.meshes[1].normals.size(), 9u);
+  EXPECT_EQ(model.materials.size(), 1u);
+  expect_one_warning(model, {"a.obj: line 2: ", "before its vertices"});
+}
+
+TEST(UntidyObj, NegativeReflectancesAreNone) {
+  const TemporaryFolder folder;
+  const auto model = with_mtl(folder, "newmtl red\nKd 1 0 0\nKs -0.1 0.5 -1\nNs -1\n");
+  EXPECT_EQ(model.materials[0].values.specular[0], 0.0f);
+  EXPECT_EQ(model.materials[0].values.specular[1], 0.5f);
+  EXPECT_EQ(model.materials[0].values.shininess, 0.0f);
+  ASSERT_EQ(model.warnings.size(), 3u);
+  expect_in(model.warnings[0], {"m.mtl: line 3: ", "Ks is -0.1", "taken as 0"});
+}
+
+TEST(UntidyObj, PathsOfOtherMachinesLeadToTheFileBesideTheMtl) {
+  const TemporaryFolder folder;
+  write_png(folder / "Brick.png", {9, 9, 9}, 1, 1, 3);
+  for (const char* name : {"C:\\Users\\me\\maps\\Brick.png", "c:/maps/Brick.png", "/home/me/maps/Brick.png",
+                           "C:\\maps\\BRICK.PNG", "\\\\server\\maps\\brick.png"}) {
+    const auto model = with_mtl(folder, "newmtl red\nmap_Kd " + std::string(name) + "\n");
+    EXPECT_EQ(model.textures.at(0).bytes.size(), 3u) << name;
+    expect_one_warning(model, {"m.mtl: line 2: ", "Brick.png is read in its place"});
+  }
+  const auto missing = with_mtl(folder, "newmtl red\nmap_Kd C:\\maps\\other.png\n");
+  expect_one_warning(missing, {"m.mtl: line 2: ", "C:\\maps\\other.png", "does not exist"});
+  folder.write("n.mtl", "newmtl red\nKd 1 0 0\n");
+  expect_one_warning(
+      read(folder.write("a.obj", "mtllib D:\\x\\n.mtl\n" + std::string(kTriangle) + "usemtl red\nf 1 2 3\n")),
+      {"a.obj: line 1: ", "n.mtl is read in its place"});
+}
+
+TEST(UntidyObj, NamesAreFoundInWrongCase) {
+  const TemporaryFolder folder;
+  folder.write("Maps/x", "");
+  write_png(folder / "Maps/Brick.PNG", {9, 9, 9}, 1, 1, 3);
+  folder.write("Room.MTL", "newmtl Red\nKd 1 0 0\nmap_Kd maps\\brick.png\n");
+  const auto model =
+      read(folder.write("a.obj", "mtllib room.mtl\n" + std::string(kTriangle) + "usemtl red\nf 1 2 3\n"));
+  ASSERT_EQ(model.materials.size(), 1u);
+  EXPECT_EQ(model.textures.at(0).bytes.size(), 3u);
+  ASSERT_EQ(model.warnings.size(), 3u);
+  expect_in(model.warnings[0], {"a.obj: line 1: ", "room.mtl", "Room.MTL"});
+  expect_in(model.warnings[1], {"Room.MTL: line 3: ", "Brick.PNG"});
+  expect_in(model.warnings[2], {"a.obj: line 5: ", "\"red\"", "\"Red\" is taken"});
+}
+
+TEST(UntidyObj, WhatRealMtlFilesHoldIsRead) {
+  const TemporaryFolder folder;
+  write_png(folder / "t.png", {9, 9, 9}, 1, 1, 3);
+  const auto model =
+      with_mtl(folder,
+               "\t# exported\rnewmtl other\rKd 1 1 1\r\r\tnewmtl red  \r  Ka 0 0 0\r\tKs 0.25\r  d -halo 0.5\r"
+               "map_Kd -o 0.5 -cc on -mm 0 1 -clamp on t.png\rmap_Bump -bm 1 none.png\rillum 2");
+  const auto& red = model.materials.at(1).values;
+  EXPECT_EQ(red.specular[2], 0.25f) << "one number stands for three";
+  EXPECT_EQ(red.opacity, 0.5f);
+  EXPECT_EQ(red.diffuse[0], 1.0f) << "a texture without Kd, whatever material came before";
+  EXPECT_EQ(model.textures.at(0).flags & LUMICUT_CLAMP, uint32_t{LUMICUT_CLAMP});
+  expect_one_warning(model, {"m.mtl: line 9: ", "-s and -o"});
+}
+
+TEST(UntidyObj, WhatRealObjFilesHoldIsRead) {
+  const TemporaryFolder folder;
+  const auto model =
+      read(folder.write("a.obj",
+                        "  v  0 0 0 1 0.5 0 \n\tv\t1 0 0 0.1 0.2 0.3\nv 0 1 0 1.0\nvt 0 0 0\nvt 1 0 0\nvn 0 0 1\n"
+                        "vp 1\no a\ng\ns 1\nf 1/1/1  2/2/1\t3/1/1 \nf 1//1 2//1 3//1\nf 1/ 2/ 3/"));
+  EXPECT_EQ(model.meshes.size(), 2u);
+  EXPECT_TRUE(model.warnings.empty()) << testing::PrintToString(model.warnings);
+}
+
+TEST(UntidyObj, TenWarningsOfAKindAreToldInFullAndTheRestCounted) {
+  const TemporaryFolder folder;
+  std::string text = kTriangle;
+  for (int i = 0; i < 35; ++i) text += "usemtl m" + std::to_string(i) + "\nf 1 2 3\n";
+  const auto model = read(folder.write("a.obj", "mtllib none.mtl\n" + text));
+  ASSERT_EQ(model.warnings.size(), 12u);
+  EXPECT_EQ(model.warnings.back(), "25 more unknown materials");
+}
+
+TEST(SceneObj, ManyTextureCoordinatesOfOneVertexTakeLinearTime) {
+  // Work is counted in corners a second against a file whose vertices are all shared: a machine's load cancels out.
+  const TemporaryFolder folder;
+  const auto seconds = [&](int uvs) {
+    std::string text = kTriangle;
+    for (int i = 0; i < uvs; ++i) text += "vt 0." + std::to_string(i) + " 0\n";
+    for (int i = 0; i < 20000; ++i) {
+      const std::string uv = std::to_string(i % uvs + 1);
+      text += "f 1/" + uv + " 2/" + uv + " 3/" + uv + "\n";
+    }
+    const std::string file = folder.write("a.obj", text);
+    const std::clock_t begin = std::clock();
+    EXPECT_EQ(read(file).meshes.at(0).indices.size(), 60000u);
+    return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  };
+  const double few = seconds(1);
+  EXPECT_LT(seconds(20000), 20 * few + 0.1) << "searching all vertices of a position takes hundreds of times as long";
 }
 
 TEST(SceneObj, TruncatedAtAnyByteItIsReadOrRefused) {

@@ -1,0 +1,28 @@
+// Text files of any system, made plain for readers that go by lines.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace lumicut::io {
+
+// Without a byte-order mark; every line ends with '\n', whether the file has LF, CRLF or CR. Throws FileError for
+// UTF-16, which would be read as garbage.
+std::string plain_text(std::string text, const std::string& path);
+
+// Which line of the file a place in its text is in. Quick when places are asked for in rising order.
+class LineCounter {
+ public:
+  // `text` must outlive this and is changed: lines that end with '\' are joined with the next by spaces, comments
+  // (which begin with '#') excepted.
+  explicit LineCounter(std::string& text);
+  int line(size_t offset);
+
+ private:
+  const std::string& text_;
+  std::vector<size_t> joined_;  // where line ends were
+  size_t at_ = 0, next_joined_ = 0;
+  int line_ = 1;
+};
+
+}  // namespace lumicut::io
