@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "io/warnings.h"
+
 namespace lumicut::io {
 
 struct IesProfile {
@@ -14,10 +16,10 @@ struct IesProfile {
   double lumens() const;           // of the table, exact for its bilinear interpolant
 };
 
-// Type C, TILT=NONE and TILT=INCLUDE (whose factor at 0 degrees is taken). Throws FileError naming line, field and
-// value.
-IesProfile read_ies(const std::string& path);
+// TILT=NONE and TILT=INCLUDE (whose factor at 0 degrees is taken); types A and B are turned into C. Throws FileError
+// naming line, field and value. export_scripts/lumicut_blender/ies.py reads the same: tests/io/ies_corpus.json.
+IesProfile read_ies(const std::string& path, Warnings& warnings);
 // The same from text; `path` is for messages.
-IesProfile parse_ies(const std::string& text, const std::string& path);
+IesProfile parse_ies(const std::string& text, const std::string& path, Warnings& warnings);
 
 }  // namespace lumicut::io

@@ -575,7 +575,7 @@ class SceneReader {
     store(light.tangent, zero * std::cos(turn) + cross(zero, axis) * std::sin(turn));
 
     const std::string path = resolve(file);
-    IesProfile ies = read_ies(path);
+    IesProfile ies = read_ies(path, scene_.warnings);
     Profile profile;
     profile.file = path;
     if (light.type == LUMICUT_SPOT) cut_cone(ies, light);

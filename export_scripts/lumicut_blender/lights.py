@@ -115,6 +115,10 @@ class Profiles:
         key = internal, source
         if key not in self._tables:
             table = None
+
+            def remark(words):
+                self.report.note(f"{source}: {words}", "IES files read with a remark")
+
             try:
                 if not source:
                     raise ies.IesError("there is none")
@@ -124,7 +128,7 @@ class Profiles:
                     with open(source, encoding="latin-1") as file:
                         text = file.read()
                 table = (source if internal else bpy.path.basename(source),
-                         *ies.resampled(*ies.parse(text), wraps=bpy.app.version < IES_WITHOUT_WRAP))
+                         *ies.resampled(*ies.parse(text, remark), wraps=bpy.app.version < IES_WITHOUT_WRAP))
             except (ies.IesError, OSError) as reason:
                 words = reason.strerror if isinstance(reason, OSError) else str(reason)
                 table = f"{source or node.name} ({words})"
