@@ -148,17 +148,24 @@ Metrics compare_images(const RgbImage& image, const RgbImage& reference, const M
   const Laplacians sums = laplacians(image, reference, counts);
   m.lmse = sums.difference2 == 0 ? 0 : sums.difference2 / (sums.reference2 > 0 ? sums.reference2 : 1);
 
-  if (options.flip) {
-    auto a = exposed(image, exposure), b = exposed(reference, exposure);
+  if (options.flip || options.hdr_flip) {
     // What does not count must not bleed into its neighbours: the same in both images.
+    std::vector<float> a(image.pixels.begin(), image.pixels.end()), b(reference.pixels.begin(), reference.pixels.end());
     for (size_t p = 0; p < n; ++p)
       if (!counts[p])
         for (size_t c = 0; c < 3; ++c) a[p * 3 + c] = b[p * 3 + c] = is_finite(at(reference, p)) ? b[p * 3 + c] : 0.0f;
-    const auto flip =
-        flip_image({a, image.width, image.height}, {b, image.width, image.height}, options.pixels_per_degree);
-    double sum = 0;
-    for (size_t p = 0; p < n; ++p) sum += counts[p] ? double{flip[p]} : 0.0;
-    m.flip = sum / pixels;
+    const RgbImage x{a, image.width, image.height}, y{b, image.width, image.height};
+    const auto mean = [&](const std::vector<float>& flip) {
+      double sum = 0;
+      for (size_t p = 0; p < n; ++p) sum += counts[p] ? double{flip[p]} : 0.0;
+      return sum / pixels;
+    };
+    if (options.hdr_flip) m.hdr_flip = mean(hdr_flip_image(x, y, options.pixels_per_degree).image);
+    if (options.flip) {
+      const auto ea = exposed(x, exposure), eb = exposed(y, exposure);
+      m.flip =
+          mean(flip_image({ea, image.width, image.height}, {eb, image.width, image.height}, options.pixels_per_degree));
+    }
   }
   return m;
 }

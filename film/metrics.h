@@ -1,5 +1,5 @@
 // How far an image is from its reference: the one implementation of every measure. Images are linear Rec.709 radiance.
-// [thesis ch. 2, Performance: RMSE, LMSE, relative error; Andersson et al. 2020: FLIP]
+// [thesis ch. 2, Performance: RMSE, LMSE, relative error; Andersson et al. 2020: FLIP; Andersson et al. 2021: HDR-FLIP]
 //
 // Departs from the thesis, whose images lie in [0,1]: radiance has no such range, so
 //   RMSE           is divided by the mean of the reference (all counted pixels and channels): scale-invariant;
@@ -33,6 +33,7 @@ struct MetricOptions {
   // FLIP's viewing condition: a 0.7 m wide display of 3840 pixels seen from 0.7 m. [Andersson et al. 2020, sec. 4.1]
   float pixels_per_degree = 67.020643f;
   bool flip = true;
+  bool hdr_flip = false;  // takes FLIP's time once a stop of the reference's range
 };
 
 struct Metrics {
@@ -52,6 +53,7 @@ struct Metrics {
   double smape = 0;                         // mean |F - R| / (|F| + |R|) of luminance, 0..1; 0 where both are 0
   double bias = 0;                          // mean (F - R) / mean R of luminance: > 0 is too bright
   double flip = 0;                          // mean LDR-FLIP of the exposed images, 0..1
+  double hdr_flip = 0;                      // mean HDR-FLIP, 0..1
 };
 
 // Throws Error when the sizes differ or no pixel counts.
@@ -73,7 +75,16 @@ std::vector<float> error_image(const RgbImage& image, const RgbImage& reference,
 std::vector<float> relative_error_image(const RgbImage& image, const RgbImage& reference);
 
 // LDR-FLIP of two images of linear RGB, cut to [0,1] here; one value in [0,1] a pixel. [Andersson et al. 2020]
-// HDR images are exposed first: this is LDR-FLIP at one exposure, not HDR-FLIP's maximum over many.
+// HDR images are exposed first: this is LDR-FLIP at one exposure.
 std::vector<float> flip_image(const RgbImage& image, const RgbImage& reference, float pixels_per_degree);
+
+// HDR-FLIP: the greatest LDR-FLIP of the images under the ACES curve, over exposures that bring the reference's brightest
+// pixel and its median to .85, and those between, about a stop apart. [Andersson et al. 2021, Eq. 1-4]
+struct HdrFlip {
+  std::vector<float> image;    // one value in [0,1] a pixel
+  double start = 0, stop = 0;  // stops (log2 of the factor)
+  int exposures = 0;
+};
+HdrFlip hdr_flip_image(const RgbImage& image, const RgbImage& reference, float pixels_per_degree);
 
 }  // namespace lumicut

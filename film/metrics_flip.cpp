@@ -1,6 +1,7 @@
 // LDR-FLIP: a difference evaluator for alternating images. [Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström,
 // Fairchild 2020, Proc. ACM Comput. Graph. Interact. Tech. 3(2)] Sections and equations below are that paper's.
 // Departs: takes linear RGB (the paper decodes sRGB first); borders repeat the outermost pixel.
+// HDR-FLIP: [Andersson, Nilsson, Shirley, Akenine-Möller 2021, Visualizing Errors in Rendered High Dynamic Range Images]
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -237,6 +238,49 @@ std::vector<float> flip_image(const RgbImage& image, const RgbImage& reference, 
                                      std::abs(features_a.points[p] - features_b.points[p]));
     const double feature = std::pow(std::min(features / std::sqrt(2.0), 1.0), kFeaturePower);
     result[p] = static_cast<float>(std::clamp(std::pow(colour, 1 - feature), 0.0, 1.0));
+  }
+  return result;
+}
+
+HdrFlip hdr_flip_image(const RgbImage& image, const RgbImage& reference, float pixels_per_degree) {
+  // The ACES curve (k0 x² + k1 x) / (k2 x² + k3 x + k4), with the factor .6 before it.
+  constexpr double k0 = 0.36 * 2.51, k1 = 0.6 * 0.03, k2 = 0.36 * 2.43, k3 = 0.6 * 0.59, k4 = 0.14;
+  constexpr double kBright = 0.85;  // where the exposures bring the brightest pixel and the median
+  constexpr double a = k0 - kBright * k2, b = k1 - kBright * k3, c = -kBright * k4;
+  const double bright = (-b + std::sqrt(b * b - 4 * a * c)) / (2 * a);
+
+  std::vector<double> luminances;
+  for (size_t p = 0; p + 2 < reference.pixels.size(); p += 3) {
+    const double l = 0.2126 * reference.pixels[p] + 0.7152 * reference.pixels[p + 1] + 0.0722 * reference.pixels[p + 2];
+    if (std::isfinite(l)) luminances.push_back(l);
+  }
+  HdrFlip result;
+  const double greatest = luminances.empty() ? 0 : *std::max_element(luminances.begin(), luminances.end());
+  if (greatest > 0) {
+    const auto middle = luminances.begin() + static_cast<std::ptrdiff_t>(luminances.size() / 2);
+    std::nth_element(luminances.begin(), middle, luminances.end());
+    double median = *middle;
+    if (luminances.size() % 2 == 0) median = 0.5 * (median + *std::max_element(luminances.begin(), middle));
+    // A reference that is mostly black has no end of exposures.
+    median = std::max(median, greatest * 0x1p-24);
+    result.start = std::log2(bright / greatest), result.stop = std::log2(bright / median);
+  }
+  result.exposures = std::max(2, static_cast<int>(std::ceil(result.stop - result.start)));
+  const auto mapped = [&](const RgbImage& from, double exposure) {
+    std::vector<float> to(from.pixels.begin(), from.pixels.end());
+    for (float& v : to) {
+      const double x = std::max(0.0, double{v} * exposure);  // NaN becomes 0
+      v = x < 1e6 ? static_cast<float>(std::min(1.0, (k0 * x * x + k1 * x) / (k2 * x * x + k3 * x + k4))) : 1.0f;
+    }
+    return to;
+  };
+  for (int i = 0; i < result.exposures; ++i) {
+    const double exposure = std::exp2(result.start + (result.stop - result.start) * i / (result.exposures - 1));
+    const auto x = mapped(image, exposure), y = mapped(reference, exposure);
+    const auto flip =
+        flip_image({x, image.width, image.height}, {y, reference.width, reference.height}, pixels_per_degree);
+    result.image.resize(flip.size(), 0.0f);
+    for (size_t p = 0; p < flip.size(); ++p) result.image[p] = std::max(result.image[p], flip[p]);
   }
   return result;
 }

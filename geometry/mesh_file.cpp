@@ -1,7 +1,5 @@
 #include "geometry/mesh_file.h"
 
-#include <charconv>
-#include <cmath>
 #include <cstring>
 #include <fstream>
 
@@ -9,53 +7,11 @@
 
 namespace lumicut {
 
-FaceMesh read_obj_mesh(const std::string& path) {
-  std::ifstream in(path);
-  if (!in) fail_argument("mesh: cannot open " + path);
+FaceMesh make_face_mesh(std::span<const float> positions, std::span<const uint32_t> indices) {
   FaceMesh mesh;
-  std::string line;
-  size_t number = 0;
-  const auto bad = [&](const char* what) {
-    fail_argument("mesh: " + path + ", line " + std::to_string(number) + ": " + what);
-  };
-  std::vector<uint32_t> corners;
-  while (std::getline(in, line)) {
-    ++number;
-    const char* at = line.c_str();
-    const char* end = at + line.size();
-    const auto skip = [&] {
-      while (at < end && (*at == ' ' || *at == '\t' || *at == '\r')) ++at;
-    };
-    skip();
-    if (end - at < 2 || (at[1] != ' ' && at[1] != '\t')) continue;
-    if (*at == 'v') {
-      ++at;
-      Vec3d p;
-      for (int k = 0; k < 3; ++k) {
-        skip();
-        const auto r = std::from_chars(at, end, p[k]);
-        if (r.ec != std::errc() || !std::isfinite(p[k])) bad("three finite coordinates expected");
-        at = r.ptr;
-      }
-      mesh.vertices.push_back(p);
-    } else if (*at == 'f') {
-      ++at;
-      corners.clear();
-      for (skip(); at < end; skip()) {
-        long long index = 0;
-        const auto r = std::from_chars(at, end, index);
-        if (r.ec != std::errc()) bad("a vertex index expected");
-        const auto count = static_cast<long long>(mesh.vertices.size());
-        if (index < 0) index += count + 1;
-        if (index < 1 || index > count) bad("a vertex index out of range");
-        corners.push_back(static_cast<uint32_t>(index - 1));
-        at = r.ptr;
-        while (at < end && *at != ' ' && *at != '\t' && *at != '\r') ++at;  // texture and normal indices
-      }
-      if (corners.size() < 3) bad("a face of fewer than three corners");
-      for (size_t k = 2; k < corners.size(); ++k) mesh.faces.push_back({corners[0], corners[k - 1], corners[k]});
-    }
-  }
+  for (size_t i = 0; i + 2 < positions.size(); i += 3)
+    mesh.vertices.push_back({double{positions[i]}, double{positions[i + 1]}, double{positions[i + 2]}});
+  for (size_t i = 0; i + 2 < indices.size(); i += 3) mesh.faces.push_back({indices[i], indices[i + 1], indices[i + 2]});
   return mesh;
 }
 

@@ -1,4 +1,4 @@
-// Meshes of the geometry tools: reads the positions and faces of an OBJ file, writes coloured PLY.
+// Meshes of the geometry tools: from a reader's arrays, and into coloured PLY.
 #pragma once
 
 #include <array>
@@ -10,9 +10,8 @@
 
 namespace lumicut {
 
-// `v` and `f` lines; polygons become fans; indices may be negative (from the end). Throws invalid_argument naming the
-// file and the line on what cannot be read.
-FaceMesh read_obj_mesh(const std::string& path);
+// Of xyz a vertex and three indices a triangle, as readers give them (io::read_obj_positions).
+FaceMesh make_face_mesh(std::span<const float> positions, std::span<const uint32_t> indices);
 
 // Binary PLY with a colour a face (0 to 255).
 void write_ply_mesh(const std::string& path, const FaceMesh& mesh,

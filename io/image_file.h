@@ -1,4 +1,4 @@
-// Images on disk: multi-layer EXR through OpenEXR, PNG through OpenImageIO. Writing is atomic.
+// Images on disk, read through OpenImageIO; written as multi-layer EXR (OpenEXR) and PNG. Writing is atomic.
 #pragma once
 
 #include <cstdint>
@@ -29,9 +29,11 @@ struct Image {
 // (values beyond 65504 are cut to it). Attributes are written as "lumicut:<key>". Throws FileError.
 void write_exr(const std::string& path, const Image& image, bool half);
 
-// Reads any scanline or tiled EXR back, with the names above. A file with a single Y channel gives radiance of equal
-// components. Throws FileError.
-Image read_exr(const std::string& path);
+// Reads any format that OpenImageIO reads: EXR of several parts too (those of the first's window), PNG, JPEG, TIFF, HDR.
+// Layers are named as above; "red" and "r" are as good as "R". The second part's R, G, B are the layer of the part's name.
+// Integers are decoded from sRGB to linear unless the file says that they are linear. A lone grey channel gives radiance
+// of equal components. Throws FileError.
+Image read_image(const std::string& path);
 
 // The bytes of a PNG: 8 bits a channel, sRGB, rows from the top; components 1 or 3. `name` is what errors call it.
 // Throws FileError.

@@ -543,9 +543,9 @@ class ObjReader {
     polygon.clear();
     for (int i = 0; i < count; ++i) {
       Corner c{resolve(corners[i].vertex_index, positions_.size() / 3, "vertex", early), -1, -1};
-      if (corners[i].texcoord_index != 0)
+      if (corners[i].texcoord_index != 0 && !options_.positions_only)
         c.uv = resolve(corners[i].texcoord_index, uvs_.size() / 2, "texture coordinate", early);
-      if (corners[i].normal_index != 0)
+      if (corners[i].normal_index != 0 && !options_.positions_only)
         c.normal = resolve(corners[i].normal_index, normals_.size() / 3, "normal", early);
       polygon.push_back(c);
     }
@@ -633,7 +633,7 @@ class ObjReader {
     }
     for (auto& part : parts_) {
       if (part.mesh.indices.empty()) continue;
-      if (uvs_.empty()) part.mesh.uvs.clear();
+      if (uvs_.empty() || options_.positions_only) part.mesh.uvs.clear();
       model_.meshes.push_back(std::move(part.mesh));
     }
     if (model_.meshes.empty()) throw FileError(path_, "holds no face");
@@ -708,6 +708,12 @@ std::vector<uint32_t> triangulate_polygon(const std::vector<float>& points) {
 
 ObjModel read_obj(const std::string& path, const ObjOptions& options, TextureStore& textures, Warnings& warnings) {
   return ObjReader(path, options, textures, warnings).read();
+}
+
+Mesh read_obj_positions(const std::string& path, Warnings& warnings) {
+  std::vector<Texture> textures;
+  TextureStore store(textures);
+  return std::move(read_obj(path, {.read_materials = false, .positions_only = true}, store, warnings).meshes.at(0));
 }
 
 }  // namespace lumicut::io

@@ -23,12 +23,16 @@ struct ObjModel {
 };
 
 struct ObjOptions {
-  bool read_materials = true;  // false: no MTL is read, and all triangles have material 0 (of the caller's)
+  bool read_materials = true;   // false: no MTL is read, and all triangles have material 0 (of the caller's)
+  bool positions_only = false;  // one mesh without uvs and normals, whose faces share the file's vertices
 };
 
 // Throws FileError: missing file, number that is none, index out of range, no face at all, unreadable texture. Warns of
 // what is missing (MTL, material, texture: grey stands in) or passed over.
 ObjModel read_obj(const std::string& path, const ObjOptions& options, TextureStore& textures, Warnings& warnings);
+
+// Positions and indices alone: for geometry that needs to know which faces meet.
+Mesh read_obj_positions(const std::string& path, Warnings& warnings);
 
 // Triangles of a polygon in space, as indices of its corners; concave ones by clipping ears. `points` holds xyz a
 // corner.

@@ -106,7 +106,7 @@ void describe_times(const RenderStats& stats, ordered_json& info) {
 }
 
 BenchReference load(const std::string& path, ordered_json info) {
-  const io::Image image = io::read_exr(path);
+  const io::Image image = io::read_image(path);
   const io::ImageLayer* radiance = image.find("radiance");
   if (radiance == nullptr || radiance->components != 3) throw io::FileError(path, "has no radiance");
   BenchReference r;

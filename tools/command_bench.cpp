@@ -349,7 +349,7 @@ class BenchCommand {
     Trial trial;
     trial.stats = render_in_child(arguments, in_output(".stats.json"), [this] { tick(); });
     if (!measure) return trial;
-    const io::Image image = io::read_exr(image_file);
+    const io::Image image = io::read_image(image_file);
     const auto& pixels = image.find("radiance")->pixels;
     MetricOptions options;
     options.flip = false;

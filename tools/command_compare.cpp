@@ -16,15 +16,42 @@ namespace lumicut::tools {
 namespace {
 
 struct Options {
-  std::string image, reference, error_image, flip_image, error_map, signed_error_map, layer = "radiance";
-  bool json = false, no_flip = false;
+  std::string image, reference, error_image, flip_image, hdr_flip_image, error_map, signed_error_map;
+  std::string layer = "radiance", reference_layer;
+  bool json = false, no_flip = false, hdr_flip = false;
   float scale = 32, ignore_above = std::numeric_limits<float>::infinity(), exposure = 0, error_map_top = 0;
 };
 
+std::string lower(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+// The layer of that name, or the only one whose name ends so: "Combined" of "ViewLayer.Combined". "radiance", which other
+// programs do not write, is also their only "Combined", only layer of three components or only layer.
+const io::ImageLayer* find_layer(const io::Image& image, const std::string& name) {
+  if (const auto* found = image.find(name)) return found;
+  const auto only = [&](const auto& fits) {
+    const io::ImageLayer* found = nullptr;
+    int count = 0;
+    for (const auto& layer : image.layers)
+      if (fits(layer)) found = &layer, ++count;
+    return count == 1 ? found : nullptr;
+  };
+  const auto ending = [&](const std::string& end) {
+    return only([&](const io::ImageLayer& layer) { return lower("." + layer.name).ends_with("." + lower(end)); });
+  };
+  if (const auto* found = ending(name)) return found;
+  if (name != "radiance") return nullptr;
+  if (const auto* found = ending("combined")) return found;
+  if (const auto* found = only([](const io::ImageLayer& layer) { return layer.components == 3; })) return found;
+  return only([](const io::ImageLayer&) { return true; });
+}
+
 // The layer as RGB; one component is repeated.
 std::vector<float> load(const std::string& path, const std::string& layer, io::Image& image) {
-  image = io::read_exr(path);
-  const io::ImageLayer* found = image.find(layer);
+  image = io::read_image(path);
+  const io::ImageLayer* found = find_layer(image, layer);
   if (!found) {
     std::string names;
     for (const auto& l : image.layers) names += (names.empty() ? "" : ", ") + l.name;
@@ -62,11 +89,13 @@ void write_error_map(const std::string& path, std::vector<float> errors, const i
 }
 
 void compare(const Options& options) {
-  for (const auto& path : {options.error_image, options.flip_image, options.error_map, options.signed_error_map})
+  for (const auto& path :
+       {options.error_image, options.flip_image, options.hdr_flip_image, options.error_map, options.signed_error_map})
     if (!path.empty()) io::AtomicFile file(path);
   io::Image a, b;
   const auto image_pixels = load(options.image, options.layer, a);
-  const auto reference_pixels = load(options.reference, options.layer, b);
+  const auto reference_pixels =
+      load(options.reference, options.reference_layer.empty() ? options.layer : options.reference_layer, b);
   if (a.width != b.width || a.height != b.height || a.x0 != b.x0 || a.y0 != b.y0)
     throw io::FileError(options.image,
                         fmt::format("shows {} x {} pixels from ({}, {}), but {} shows {} x {} from ({}, {})", a.width,
@@ -77,6 +106,7 @@ void compare(const Options& options) {
   metric_options.ignore_above = options.ignore_above;
   metric_options.exposure = options.exposure;
   metric_options.flip = !options.no_flip;
+  metric_options.hdr_flip = options.hdr_flip;
   const Metrics m = compare_images(image, reference, metric_options);
   nlohmann::ordered_json json = {
       {"rmse", m.rmse},
@@ -92,6 +122,7 @@ void compare(const Options& options) {
       {"smape", m.smape},
       {"bias", m.bias},
       {"flip", nullptr},
+      {"hdr_flip", nullptr},
       {"reference_mean", m.reference_mean},
       {"exposure", m.exposure},
       {"pixels", m.pixels},
@@ -99,6 +130,7 @@ void compare(const Options& options) {
       {"bad_pixels", m.bad_pixels},
   };
   if (!options.no_flip) json["flip"] = m.flip;
+  if (options.hdr_flip) json["hdr_flip"] = m.hdr_flip;
   const auto exposure = static_cast<float>(m.exposure);
   if (!options.error_image.empty())
     write_grey(options.error_image, error_image(image, reference, exposure, options.scale), a);
@@ -117,6 +149,8 @@ void compare(const Options& options) {
         flip_image({x, image.width, image.height}, {y, image.width, image.height}, metric_options.pixels_per_degree),
         a);
   }
+  if (!options.hdr_flip_image.empty())
+    write_grey(options.hdr_flip_image, hdr_flip_image(image, reference, metric_options.pixels_per_degree).image, a);
   if (options.json) {
     fmt::print("{}\n", json.dump(2));
     return;
@@ -127,6 +161,7 @@ void compare(const Options& options) {
              100 * m.p95_relative_error, 100 * m.p99_relative_error);
   fmt::print("MRSE {:.5g}   SMAPE {:.5g}   bias {:+.3f} %", m.mrse, m.smape, 100 * m.bias);
   if (!options.no_flip) fmt::print("   FLIP {:.5f}", m.flip);
+  if (options.hdr_flip) fmt::print("   HDR-FLIP {:.5f}", m.hdr_flip);
   fmt::print("\n{} pixels compared", m.pixels);
   if (m.ignored > 0) fmt::print(", {} ignored (luminance of at least {})", m.ignored, options.ignore_above);
   if (m.bad_pixels > 0) fmt::print(", {} NOT FINITE", m.bad_pixels);
@@ -138,8 +173,8 @@ void compare(const Options& options) {
 void add_compare(CLI::App& app) {
   auto* command = app.add_subcommand("compare", "Measure an image against its reference");
   const auto o = std::make_shared<Options>();
-  command->add_option("image", o->image, "The EXR to judge")->required();
-  command->add_option("reference", o->reference, "The EXR that counts as right")->required();
+  command->add_option("image", o->image, "The image to judge: any format that OpenImageIO reads")->required();
+  command->add_option("reference", o->reference, "The image that counts as right")->required();
   command->add_flag("--json", o->json, "Print JSON instead of text");
   command->add_option("--error-image", o->error_image, "Write a grey PNG of the differences");
   command->add_option("--scale", o->scale, "Factor of the differences in that image")
@@ -161,8 +196,12 @@ void add_compare(CLI::App& app) {
       ->add_option("--exposure", o->exposure,
                    "Factor from radiance to [0,1] for display measures (default: 0.18 / geometric mean)")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--layer", o->layer, "Layer to compare")->capture_default_str();
+  command->add_option("--layer", o->layer, "Layer to compare, of both images")->capture_default_str();
+  command->add_option("--reference-layer", o->reference_layer, "Layer of the reference, where it has another name");
   command->add_flag("--no-flip", o->no_flip, "Do without FLIP, the slowest measure");
+  command->add_flag("--hdr-flip", o->hdr_flip,
+                    "HDR-FLIP too: FLIP's greatest over all exposures; takes several times as long");
+  command->add_option("--hdr-flip-image", o->hdr_flip_image, "Write a grey PNG of HDR-FLIP");
   command->callback([o] { compare(*o); });
 }
 

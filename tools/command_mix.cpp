@@ -55,7 +55,7 @@ void mix(const Options& o) {
   for (const auto& text : o.gains)
     if (const auto [group, gain] = parse_gain(text); !gains.emplace(group, gain).second)
       throw UsageError(fmt::format("--gain {}: group {} is given twice", text, group));
-  const io::Image image = io::read_exr(o.input);
+  const io::Image image = io::read_image(o.input);
   io::Image out = image;
   out.layers = {{"radiance", 3, std::vector<float>(size_t{3} * image.width * image.height, 0.0f)}};
   std::vector<float>& sum = out.layers[0].pixels;

@@ -83,7 +83,7 @@ class GroupBuilder {
       group_.missing.push_back(path.string());
       return false;
     }
-    image = io::read_exr(path.string());
+    image = io::read_image(path.string());
     const io::ImageLayer* radiance = image.find("radiance");
     if (radiance == nullptr || radiance->components != 3) throw io::FileError(path.string(), "has no radiance");
     return true;

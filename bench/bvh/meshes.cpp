@@ -4,10 +4,9 @@
 #include <cstdlib>
 #include <filesystem>
 
-#define TINYOBJLOADER_IMPLEMENTATION
-#include <tiny_obj_loader.h>
-
 #include "core/rng.h"
+#include "io/file_error.h"
+#include "io/scene_obj.h"
 
 namespace lumicut::bench {
 
@@ -21,16 +20,16 @@ BenchMesh load_obj(const std::string& folder, const std::string& name) {
   BenchMesh mesh;
   mesh.name = name;
   const std::filesystem::path path = std::filesystem::path(folder) / name / (name + ".obj");
-  tinyobj::ObjReaderConfig config;
-  config.triangulate = true;
-  config.vertex_color = false;
-  tinyobj::ObjReader reader;
-  if (!std::filesystem::exists(path) || !reader.ParseFromFile(path.string(), config)) return mesh;
-  const auto& vertices = reader.GetAttrib().vertices;
-  for (size_t i = 0; i + 2 < vertices.size(); i += 3)
-    mesh.positions.push_back({vertices[i], vertices[i + 1], vertices[i + 2]});
-  for (const auto& shape : reader.GetShapes())
-    for (const auto& index : shape.mesh.indices) mesh.indices.push_back(static_cast<uint32_t>(index.vertex_index));
+  io::Mesh read;
+  try {
+    io::Warnings warnings;
+    read = io::read_obj_positions(path.string(), warnings);
+  } catch (const io::FileError&) {
+    return mesh;
+  }
+  for (size_t i = 0; i + 2 < read.positions.size(); i += 3)
+    mesh.positions.push_back({read.positions[i], read.positions[i + 1], read.positions[i + 2]});
+  mesh.indices = std::move(read.indices);
   return mesh;
 }
 

@@ -19,7 +19,7 @@ struct BenchMesh {
 // The folder of scenes: LUMICUT_SCENES, else ../shared/scenes beside the project. Empty when there is none.
 std::string scenes_folder();
 
-// Wavefront OBJ through tinyobjloader, faces fanned into triangles. No triangles when the file cannot be read.
+// Wavefront OBJ. No triangles when the file cannot be read.
 BenchMesh load_obj(const std::string& folder, const std::string& name);
 
 // Random triangles of mixed size; `seed` names them.

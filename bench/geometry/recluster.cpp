@@ -14,6 +14,7 @@
 #include "geometry/face_cluster_tree.h"
 #include "geometry/face_kmeans.h"
 #include "geometry/mesh_file.h"
+#include "io/scene_obj.h"
 #ifdef LUMICUT_HAS_METIS
 #include <metis.h>
 #endif
@@ -42,7 +43,9 @@ FaceMesh torus() {
 
 FaceMesh load(const std::string& scenes, const char* name) {
   if (smoke()) return torus();
-  return read_obj_mesh(scenes + "/" + name + "/" + name + ".obj");
+  io::Warnings warnings;
+  const io::Mesh mesh = io::read_obj_positions(scenes + "/" + name + "/" + name + ".obj", warnings);
+  return make_face_mesh(mesh.positions, mesh.indices);
 }
 
 Vec3d extent(const FaceMesh& m) {

@@ -15,6 +15,7 @@
 #include "geometry/face_kmeans.h"
 #include "geometry/hitting_set.h"
 #include "geometry/mesh_file.h"
+#include "io/scene_obj.h"
 #ifdef LUMICUT_HAS_CGAL
 #include "geometry/dnet.h"
 #include "geometry/epsilon_net.h"
@@ -144,8 +145,15 @@ std::vector<Vec3d> deformed(const FaceMesh& m, double time, const ReclusterArgum
   return out;
 }
 
+FaceMesh read_mesh(const std::string& path) {
+  io::Warnings warnings;
+  const io::Mesh mesh = io::read_obj_positions(path, warnings);
+  for (const auto& warning : warnings.lines()) std::fprintf(stderr, "lumicut-geometry: warning: %s\n", warning.c_str());
+  return make_face_mesh(mesh.positions, mesh.indices);
+}
+
 int recluster(const ReclusterArguments& a) {
-  const FaceMesh start = read_obj_mesh(a.mesh);
+  const FaceMesh start = read_mesh(a.mesh);
   if (start.faces.empty()) fail_argument(a.mesh + " has no faces");
   std::filesystem::create_directories(a.out);
   FaceMesh now = start;

@@ -234,6 +234,22 @@ TEST(Flip, IsSymmetricAndWithinTheUnitRange) {
   EXPECT_EQ(mean(flip_image(a.view(), a.view(), kPpd)), 0.0);
 }
 
+TEST(HdrFlip, DoesNotDependOnTheUnitOfRadiance) {
+  // Values against an implementation of its own: tests/tools/test_compare.py.
+  auto a = noise(16, 12, 1), b = noise(16, 12, 2);
+  for (size_t i = 0; i < 60; ++i) a.pixels[i] *= 40, b.pixels[i] *= 40;
+  const HdrFlip one = hdr_flip_image(a.view(), b.view(), kPpd);
+  EXPECT_GT(one.exposures, 4) << "the brightest pixel is 40 times as bright";
+  for (auto* image : {&a, &b})
+    for (float& v : image->pixels) v *= 1024;
+  const HdrFlip other = hdr_flip_image(a.view(), b.view(), kPpd);
+  EXPECT_EQ(one.exposures, other.exposures);
+  EXPECT_NEAR(mean(one.image), mean(other.image), 1e-5) << "powers of two: rounding alone";
+  EXPECT_EQ(mean(hdr_flip_image(a.view(), a.view(), kPpd).image), 0.0);
+  const auto black = flat(8, 8, 0, 0, 0);
+  EXPECT_EQ(mean(hdr_flip_image(black.view(), black.view(), kPpd).image), 0.0);
+}
+
 TEST(Flip, SmallDifferencesOfGreyFollowThePowerLaw) {
   // For flat grey images only the colour part is left: .95 / (.4 cmax) · ΔL*^.7, so half the ΔL* gives 2^-.7 of it.
   const auto grey = [](double lightness) { return static_cast<float>(std::pow((lightness + 16) / 116, 3)); };

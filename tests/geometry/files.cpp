@@ -48,23 +48,13 @@ TEST(Csv, NamesTheLineAndTheFieldOfWhatIsWrong) {
   EXPECT_NE(read("1,2,3\nx,y,r\n").find("line 2: x is missing or not a number"), std::string::npos);
 }
 
-TEST(ObjMesh, ReadsPolygonsAndNegativeIndicesAndRefusesTheRest) {
-  const std::string path = testing::TempDir() + "lumicut_geometry.obj";
-  const auto read = [&](const char* text) {
-    std::ofstream(path) << text;
-    return read_obj_mesh(path);
-  };
-  const FaceMesh m =
-      read("# a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1 4//1\nf -4/1 -3/2 -2/3\n");
-  ASSERT_EQ(m.faces.size(), 3u);
-  EXPECT_EQ(m.faces[2], (std::array<uint32_t, 3>{0, 1, 2}));
-  EXPECT_NE(message_of([&] { read("v 0 0\n"); }).find("line 1"), std::string::npos);
-  EXPECT_NE(message_of([&] { read("v 0 0 nan\n"); }).find("finite"), std::string::npos);
-  EXPECT_NE(message_of([&] { read("v 0 0 0\nf 1 2 3\n"); }).find("line 2: a vertex index out of range"),
-            std::string::npos);
-  EXPECT_NE(message_of([&] { read("v 0 0 0\nf 1 1\n"); }).find("fewer than three"), std::string::npos);
-  EXPECT_NE(message_of([&] { read_obj_mesh(path + ".absent"); }).find("cannot open"), std::string::npos);
-  std::remove(path.c_str());
+TEST(FaceMesh, IsMadeOfAReadersArrays) {
+  const std::vector<float> positions = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  const std::vector<uint32_t> indices = {0, 1, 2, 2, 1, 0};
+  const FaceMesh m = make_face_mesh(positions, indices);
+  ASSERT_EQ(m.vertices.size(), 3u);
+  EXPECT_EQ(m.vertices[1].x, 1.0);
+  EXPECT_EQ(m.faces, (std::vector<std::array<uint32_t, 3>>{{0, 1, 2}, {2, 1, 0}}));
 }
 
 TEST(PlyMesh, HasTheSizeThatItsHeaderSays) {

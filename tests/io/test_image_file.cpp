@@ -26,7 +26,7 @@ TEST(ImageFile, LayersAndAttributesComeBack) {
   const TemporaryFolder folder;
   const Image image = example();
   write_exr(folder / "a.exr", image, false);
-  const Image back = read_exr(folder / "a.exr");
+  const Image back = read_image(folder / "a.exr");
   EXPECT_EQ(back.width, 5);
   EXPECT_EQ(back.height, 3);
   EXPECT_EQ(back.attributes, image.attributes);
@@ -46,7 +46,7 @@ TEST(ImageFile, HalfFloatsAreRoundedAndCut) {
   image.width = image.height = 1;
   image.layers = {{"radiance", 3, {1e9f, 0.1f, -2}}};
   write_exr(folder / "a.exr", image, true);
-  const auto back = read_exr(folder / "a.exr").layers.at(0).pixels;
+  const auto back = read_image(folder / "a.exr").layers.at(0).pixels;
   EXPECT_EQ(back[0], 65504.0f);
   EXPECT_NEAR(back[1], 0.1f, 0.1f / 2048);
   EXPECT_EQ(back[2], -2.0f);
@@ -57,7 +57,7 @@ TEST(ImageFile, ACropKeepsItsPlace) {
   Image image = example();
   image.x0 = 10, image.y0 = 20, image.frame_width = 64, image.frame_height = 48;
   write_exr(folder / "a.exr", image, false);
-  const Image back = read_exr(folder / "a.exr");
+  const Image back = read_image(folder / "a.exr");
   EXPECT_EQ(back.x0, 10);
   EXPECT_EQ(back.y0, 20);
   EXPECT_EQ(back.frame_width, 64);
@@ -67,12 +67,12 @@ TEST(ImageFile, ACropKeepsItsPlace) {
 
 TEST(ImageFile, BrokenImagesAreErrors) {
   const TemporaryFolder folder;
-  expect_in(error_of([&] { read_exr(folder / "none.exr"); }), {"none.exr", "no such file"});
-  expect_in(error_of([&] { read_exr(folder.write("text.exr", "not an image")); }), {"text.exr", "not readable as EXR"});
+  expect_in(error_of([&] { read_image(folder / "none.exr"); }), {"none.exr", "no such file"});
+  expect_in(error_of([&] { read_image(folder.write("text.exr", "not an image")); }), {"text.exr", "not readable as an image"});
   write_exr(folder / "a.exr", example(), false);
   const std::string whole = read_whole_file(folder / "a.exr");
   for (const size_t length : {size_t{0}, size_t{4}, size_t{100}, whole.size() / 2, whole.size() - 10})
-    expect_in(error_of([&] { read_exr(folder.write("cut.exr", whole.substr(0, length))); }),
+    expect_in(error_of([&] { read_image(folder.write("cut.exr", whole.substr(0, length))); }),
               {"cut.exr", "not readable"});
 }
 
@@ -88,7 +88,7 @@ TEST(ImageFile, BytesTurnedOverNeverCrash) {
       broken[state % broken.size()] = static_cast<char>(state >> 24);
     }
     try {
-      read_exr(folder.write("b.exr", broken));
+      read_image(folder.write("b.exr", broken));
     } catch (const FileError&) {  // either is right; a crash is not
     }
   }

@@ -31,7 +31,7 @@ Reference read_reference(const std::string& scene) {
   std::ifstream file(folder(scene) + "/ref.json");
   const auto json = nlohmann::json::parse(file);
   r.vpls = json.at("vpls");
-  const Image image = read_exr(folder(scene) + "/ref.exr");
+  const Image image = read_image(folder(scene) + "/ref.exr");
   r.width = static_cast<uint32_t>(image.width), r.height = static_cast<uint32_t>(image.height);
   r.pixels = image.find("radiance")->pixels;
   return r;

@@ -185,6 +185,20 @@ TEST(SceneObj, WithoutMaterialsNoMtlIsNeeded) {
   EXPECT_EQ(model.meshes[0].materials, (std::vector<uint32_t>{0}));
 }
 
+TEST(SceneObj, PositionsAloneAreSharedByAllFaces) {
+  const TemporaryFolder folder;
+  Warnings warnings;
+  const Mesh mesh = read_obj_positions(
+      folder.write("a.obj",
+                   "mtllib none.mtl\n" + std::string(kTriangle) +
+                       "v 1 1 0\nvt 0 0\nvt 1 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\nusemtl x\nf 2/2 4/2 3/2\nf 1 3 9\nv 0 "
+                       "0 1\nv 0 0 2\nv 0 0 3\nv 0 0 4\nv 0 0 5\n"),
+      warnings);
+  EXPECT_EQ(mesh.indices, (std::vector<uint32_t>{0, 1, 2, 1, 3, 2, 0, 2, 4}));
+  EXPECT_EQ(mesh.positions.size(), 15u) << "vertices that no face uses are left out";
+  EXPECT_TRUE(mesh.uvs.empty() && mesh.normals.empty());
+}
+
 TEST(SceneObj, LineEndsOfAllSystemsAreRead) {
   const TemporaryFolder folder;
   for (const char* end : {"\n", "\r\n", "\r"}) {

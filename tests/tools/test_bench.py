@@ -146,6 +146,7 @@ class Matches(Bench):
 class Failures(Bench):
     def test_bad_plans_are_named_with_file_key_and_value(self):
         match = {"measure": "rmse", "to": "LC", "vary": "error", "range": [0.01, 0.1]}
+        many = [0.01 + i / 10000 for i in range(300)]
         wrong = [
             ({"scenes": []}, "scenes", "no scene"),
             ({"runs": []}, "runs", "no run"),
@@ -169,6 +170,9 @@ class Failures(Bench):
             ({"runs": [LC, {**IC, "match": {**match, "range": [0.1, 0.01]}}]}, "runs[1].match.range"),
             ({"runs": [LC, {**IC, "match": {**match, "range": [0.1, 10]}}]}, "runs[1].match.range", "error"),
             ({"runs": [LC, {**IC, "match": {**match, "measure": "beauty"}}]}, "runs[1].match.measure", "beauty"),
+            # Lists beside each other multiply.
+            ({"runs": [{**LC, "parameters": {"error": many, "max_cut": list(range(10, 310))}}]}, "runs[0].parameters", "10000 runs"),
+            ({"vpls": list(range(1, 101)), "seeds": list(range(100)), "samples": list(range(1, 101))}, "scenes[0]", "100000"),
         ]
         plans = [self.plan(**{"runs": [LC], **change, "name": f"{i}.json"}) for i, (change, *_) in enumerate(wrong)]
         results = together([lambda plan=plan: lumicut("bench", plan, "-o", self.folder / "out") for plan in plans])

@@ -143,6 +143,28 @@ class Check(Base):
         self.assertIn("suspicious: no_light", result.stdout)
         self.assert_ends(lumicut("check", self.scene(), "--no-forecast", "--strict"), OK)
 
+    def test_warnings_about_files_are_told_and_errors_where_strict(self):
+        (self.folder / "untidy.mtl").write_text("newmtl red\nKd 1 0 0\nmap_Kd none.png\n")
+        (self.folder / "untidy.obj").write_text(
+            "mtllib UNTIDY.mtl\nv -1 0 -1\nv 1 0 -1\nv 0 0 1\nusemtl red\nf 1 3 2\nusemtl blue\nf 1 2 3\nl 1 2\n")
+        scene = self.scene(lambda s: s["meshes"].append({"obj": "untidy.obj"}))
+        told = ("untidy.obj: line 1: ", "untidy.mtl: line 3: ", "none.png", "untidy.obj: line 7: ", "blue", "untidy.obj: line 9: ")
+        result = lumicut("check", scene, "--no-forecast")
+        self.assert_ends(result, OK)
+        for text in told:
+            self.assertIn(text, result.stdout)
+        self.assert_ends(lumicut("check", scene, "--no-forecast", "--strict"), FAILED)
+        image, cameras = self.folder / "o.exr", self.folder / "cameras.json"
+        render = ("render", scene, "-o", image, "--size", "8x8", "--vpls", "10", "-q")
+        result = lumicut(*render)
+        self.assert_ends(result, OK, *told)
+        self.assertEqual(result.stderr.count("warning"), 4, result.stderr)
+        image.unlink()
+        for command in (render, ("errors", scene, "-o", self.folder / "errors", "-q"),
+                        ("bench", "--scene", scene, "--run", "lightcuts", "-o", self.folder / "bench", "-q")):
+            self.assert_ends(lumicut(*command, "--strict"), BAD_FILE, "untidy.obj: line 7: " if command[0] != "bench" else "strict")
+        self.assertFalse(image.exists() or cameras.exists())
+
     def test_wrong_files_and_options_end_as_in_render(self):
         self.assert_ends(lumicut("check", "none.json"), BAD_FILE, "none.json")
         self.assert_ends(lumicut("check", self.scene(lambda s: s["meshes"].append({"obj": "none.obj"}))), BAD_FILE, "none.obj")
