@@ -68,7 +68,8 @@ TEST(ImageFile, ACropKeepsItsPlace) {
 TEST(ImageFile, BrokenImagesAreErrors) {
   const TemporaryFolder folder;
   expect_in(error_of([&] { read_image(folder / "none.exr"); }), {"none.exr", "no such file"});
-  expect_in(error_of([&] { read_image(folder.write("text.exr", "not an image")); }), {"text.exr", "not readable as an image"});
+  expect_in(error_of([&] { read_image(folder.write("text.exr", "not an image")); }),
+            {"text.exr", "not readable as an image"});
   write_exr(folder / "a.exr", example(), false);
   const std::string whole = read_whole_file(folder / "a.exr");
   for (const size_t length : {size_t{0}, size_t{4}, size_t{100}, whole.size() / 2, whole.size() - 10})
