@@ -8,7 +8,8 @@ using namespace lumicut;
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   try {
-    const io::IesProfile profile = io::parse_ies(std::string(fuzz::text_of(data, size)), "lamp.ies");
+    io::Warnings warnings;
+    const io::IesProfile profile = io::parse_ies(std::string(fuzz::text_of(data, size)), "lamp.ies", warnings);
     if (profile.candela.size() != profile.vertical.size() * profile.horizontal.size())
       fuzz::finding("the table does not fit its angles");
     profile.lumens();

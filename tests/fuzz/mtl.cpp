@@ -18,7 +18,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   io::TextureStore store(textures);
   folder.write("a.mtl", fuzz::text_of(data, size));
   try {
-    io::read_obj(folder / "a.obj", {}, store);
+    io::Warnings warnings;
+    io::read_obj(folder / "a.obj", {}, store, warnings);
   } catch (const io::FileError&) {
   }
   return 0;

@@ -15,7 +15,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const std::string path = folder.write(name, fuzz::text_of(data + 2, size - 2));
   try {
     if (data[1] % (kUses + 1) == kUses) {
-      io::read_exr(path);
+      io::read_image(path);
     } else {
       std::vector<io::Texture> textures;
       io::TextureStore(textures).get(path, static_cast<io::TextureUse>(data[1] % (kUses + 1)), 0, "material \"a\"");
