@@ -68,12 +68,20 @@ std::optional<Difference> difference(const std::string& saved, const std::string
   return std::nullopt;
 }
 
-std::string instruction_class() {
+std::string instruction_class(const Scene& scene) {
   const int64_t targets = hwy::SupportedTargets() & HWY_TARGETS;
   const int64_t best = targets & -targets;  // better ones have lower bits
 #if HWY_ARCH_X86
-  return best <= HWY_AVX2 ? "AVX2 or AVX-512" : "SSE4 or older";
+  bool ours = true;
+  scene.for_each_part([&](std::string_view name, const auto& part) {
+    using Part = std::remove_cvref_t<decltype(part)>;
+    if constexpr (std::is_same_v<Part, Scene::Config>) ours = ours && part.accel != "embree";
+    if constexpr (std::is_same_v<Part, bool>) ours = ours && !(name == "host_trace" && part);
+  });
+  if (best > HWY_AVX2) return "SSE4 or older";
+  return ours ? "AVX2 or AVX-512" : best <= HWY_AVX3 ? "AVX-512" : "AVX2";
 #else
+  static_cast<void>(scene);
   return hwy::TargetName(best);
 #endif
 }

@@ -53,8 +53,9 @@ struct Difference {
 // The first line in which two identities differ.
 std::optional<Difference> difference(const std::string& saved, const std::string& now);
 
-// Of the processor's best instructions that the library uses. Those with fused multiply-adds round alike, and those
-// without them: so the images of one class are the same bit for bit.
-std::string instruction_class();
+// Of the processor's best instructions, those that give the same image bit for bit. Our own code rounds alike with fused
+// multiply-adds, and alike without them; Embree, and a host's tracer for all that is known, with AVX-512 otherwise than
+// with AVX2.
+std::string instruction_class(const Scene& scene);
 
 }  // namespace lumicut

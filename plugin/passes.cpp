@@ -119,7 +119,6 @@ std::string passes_key(const Scene& scene, const std::string& integrator, const 
   const auto& [passes, max_seconds, target_error, confidence, checkpoints, groups, resume] = options;
   Identity key;
   key.add("version", std::string(LUMICUT_VERSION_TEXT));
-  key.add(kInstructions, instruction_class());
   key.add("integrator", integrator);
   key.add(params);
   key.add_fields(frame);
@@ -127,6 +126,7 @@ std::string passes_key(const Scene& scene, const std::string& integrator, const 
   key.add("groups", groups);
   key.add_virtual_lights(host_lights);
   key.add(scene, true);
+  key.add(kInstructions, instruction_class(scene));  // after the accel, on which it depends
   return key.text();
 }
 

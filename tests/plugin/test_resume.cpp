@@ -431,7 +431,7 @@ class BestInstructions {
   ~BestInstructions() { hwy::DisableTargets(0); }
 };
 
-// What docs/progressive.md promises. Textures, gloss, coats and two passes with samples of their own are in it.
+// What docs/progressive.md promises of all but Embree, whose own choice this leaves as it is. Textures, gloss, coats and two passes with samples of their own are in it.
 TEST(InstructionSets, WithFusedMultiplyAddOrWithoutGiveOneImageEach) {
   const api::Device device(2);
   for (const char* accel : {"embree", "agglomerative"})
@@ -452,14 +452,27 @@ TEST(InstructionSets, WithFusedMultiplyAddOrWithoutGiveOneImageEach) {
     }
 }
 
-TEST(InstructionSets, OfAnotherKindDoNotGoOn) {
+TEST(InstructionSets, GoOnWhereTheyRoundAlike) {
   const api::Device device(2);
-  const Host host;
-  const std::vector<uint8_t> from = checkpoint(device, host);
-  const BestInstructions limited(HWY_SSE4);
-  if (from == checkpoint(device, host)) GTEST_SKIP() << "this processor has no better instructions";
-  EXPECT_NE(refusal(device, host, from).find("this processor renders with SSE4 or older"), std::string::npos)
-      << refusal(device, host, from);
+  Host host;
+  std::vector<uint8_t> from[2];
+  for (const int embree : {0, 1})
+    host.accel = embree ? "embree" : "agglomerative", from[embree] = checkpoint(device, host);
+  const auto refused = [&](int embree, int64_t best) {
+    const BestInstructions limited(best);
+    host.accel = embree ? "embree" : "agglomerative";
+    return refusal(device, host, from[embree]);
+  };
+  const int64_t targets = hwy::SupportedTargets() & HWY_TARGETS, best = targets & -targets;
+  if (best > HWY_AVX2) GTEST_SKIP() << "this processor has no better instructions than SSE4";
+  EXPECT_EQ(refused(0, HWY_AVX2), "");
+  for (const int embree : {0, 1})
+    EXPECT_NE(refused(embree, HWY_SSE4).find("this processor renders with SSE4 or older"), std::string::npos)
+        << refused(embree, HWY_SSE4);
+  // Embree picks its own instructions, and with AVX-512 other ones for reciprocals.
+  if (best <= HWY_AVX3) {
+    EXPECT_NE(refused(1, HWY_AVX2).find("made with AVX-512 instructions"), std::string::npos) << refused(1, HWY_AVX2);
+  }
 }
 
 // ---- saved states: what they hold depends on all but the camera
