@@ -26,4 +26,4 @@ step "tests, asan"
 ctest --preset asan
 step "tests, release"
 ctest --preset release
-step done
+step "all passed"
