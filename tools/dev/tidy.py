@@ -25,8 +25,8 @@ def output(command, folder):
     return subprocess.run(command, cwd=folder, capture_output=True, check=True).stdout
 
 
-def passes(entry, build, salt):
-    """The findings in one file: None if there are none."""
+def findings(entry, build, salt):
+    """What clang-tidy says of one file; None where it finds nothing."""
     source = entry["file"]
     command = [word for word in shlex.split(entry["command"]) if not word.endswith("ccache")]
     # GCC's words that clang does not know; no object is made.
@@ -59,10 +59,13 @@ def main():
                and any(part in path for part in sys.argv[2:] or [""])]
     salt = (ROOT / ".clang-tidy").read_bytes() + output(["clang-tidy", "--version"], ROOT)
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        found = [text for text in pool.map(lambda entry: passes(entry, build, salt), entries) if text]
-    print("\n".join(found), end="")
-    print(f"tidy: {len(entries)} files, {len(found)} with findings")
-    return bool(found) or not entries
+        found = 0
+        for run in concurrent.futures.as_completed([pool.submit(findings, entry, build, salt) for entry in entries]):
+            if text := run.result():
+                found += 1
+                print(text, flush=True)
+    print(f"tidy: {len(entries)} files, {found} with findings")
+    return found > 0 or not entries
 
 
 if __name__ == "__main__":
