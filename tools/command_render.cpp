@@ -8,6 +8,7 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 
 #include "io/atomic_file.h"
@@ -115,6 +116,7 @@ class RenderCommand {
     tell();
     render();
     write(channels);
+    if (checkpoint_error_) throw *checkpoint_error_;  // the last state is not on the disk
   }
 
  private:
@@ -190,8 +192,27 @@ class RenderCommand {
     if (!crop_.empty() &&
         (crop_[0] >= crop_[2] || crop_[1] >= crop_[3] || crop_[2] > desc_.width || crop_[3] > desc_.height))
       throw UsageError(fmt::format("--crop {}: is not a part of {} x {} pixels", o_.crop, desc_.width, desc_.height));
+    check_room_for_checkpoint();
     read_seconds_ = now() - start;
     if (o_.verbosity >= 2) told_ = std::make_unique<io::SceneData>(std::move(data));
+  }
+
+  // What would fail after the first pass fails before it: a folder that is not there, no permission, a full disk. As
+  // many bytes are written as each checkpoint takes.
+  void check_room_for_checkpoint() {
+    if (o_.checkpoint.empty()) return;
+    uint64_t pixel_bytes = 40;  // of the mean's sums; light groups are not known yet
+    for (const auto& channel : choose_channels(api(), "all"))
+      pixel_bytes += 4 * static_cast<uint64_t>(channel.components);
+    const uint64_t pixels =
+        crop_.empty() ? uint64_t{desc_.width} * desc_.height : uint64_t{crop_[2] - crop_[0]} * (crop_[3] - crop_[1]);
+    const std::string trial = o_.checkpoint + ".trial";
+    try {
+      io::write_whole_file(trial, std::string(pixels * pixel_bytes, '\0'));
+    } catch (const io::FileError& error) {
+      throw io::FileError(o_.checkpoint, fmt::format("there is no place for a checkpoint: {}", error.what()));
+    }
+    std::filesystem::remove(trial);
   }
 
   // What `lumicut check` says, without its forecast.
@@ -263,6 +284,7 @@ class RenderCommand {
     if (o_.squares > 0) desc.crop[0] = rect.x0, desc.crop[1] = rect.y0, desc.crop[2] = rect.x1, desc.crop[3] = rect.y1;
     parts_.emplace_back(rect, io::Handle<lumicut_render>(api()));
     io::check(api(), api().render_start(integrator.get(), scene_.get(), &desc, parts_.back().second.out()), "render");
+    resumed_.clear(), resumed_.shrink_to_fit();  // the render has its own
   }
 
   void wait_for(size_t index, size_t count) {
@@ -282,7 +304,14 @@ class RenderCommand {
     } while (result == LUMICUT_OK && (status.state == LUMICUT_RUNNING || status.state == LUMICUT_IDLE));
     watcher_.watch(nullptr);
     stop_if_interrupted();
-    io::check(api(), result, resumed_.empty() ? "render" : o_.checkpoint);
+    io::check(api(), result, desc_.checkpoint != nullptr ? o_.checkpoint : "render");
+    if (desc_.checkpoint == nullptr || o_.seconds > 0 || o_.target_error > 0 ||
+        status.passes_done <= std::max(1u, o_.passes))
+      return;
+    bar_.wipe();
+    if (o_.verbosity >= 1)
+      fmt::print(stderr, "lumicut: warning: {} holds more passes than were asked for: the image is of all {}\n",
+                 o_.checkpoint, status.passes_done);
   }
 
   std::string phase_text(const lumicut_status& status) const {
@@ -296,18 +325,28 @@ class RenderCommand {
 
   bool progressive() const { return o_.passes > 1 || o_.seconds > 0 || o_.target_error > 0 || !o_.checkpoint.empty(); }
 
-  // What a killed render goes on from: written beside, then renamed, after each pass (on the disk at most every few
-  // seconds), and after the last.
+  // What a killed render goes on from: after each pass (on the disk at most every few seconds), and after the last. Where
+  // that fails the image goes on; it is tried again, and the command fails in the end if the last one did.
   void keep_checkpoint(lumicut_render render, const lumicut_status& status) {
     if (o_.checkpoint.empty() || status.passes_done == kept_passes_) return;
     const bool over = status.state != LUMICUT_RUNNING;
-    if (!over && kept_passes_ > 0 && now() - kept_time_ < 2.0) return;
+    if (!over && kept_time_ > 0 && now() - kept_time_ < 2.0) return;
     const void* data = nullptr;
     uint64_t size = 0;
     io::check(api(), api().render_checkpoint(render, &data, &size), o_.checkpoint);
     if (size == 0) return;
-    io::write_whole_file(o_.checkpoint, std::string(static_cast<const char*>(data), size));
-    kept_passes_ = status.passes_done, kept_time_ = now();
+    kept_time_ = now();
+    try {
+      io::write_whole_file(o_.checkpoint, {static_cast<const char*>(data), size});
+      kept_passes_ = status.passes_done;
+      checkpoint_error_.reset();
+    } catch (const io::FileError& error) {
+      if (!checkpoint_error_) {
+        bar_.wipe();
+        fmt::print(stderr, "lumicut: warning: {}; the image will be written all the same\n", error.what());
+      }
+      checkpoint_error_ = error;
+    }
   }
 
   // The part's own statistics; of squares the sums, and seconds by the wall.
@@ -434,6 +473,7 @@ class RenderCommand {
   std::string resumed_;  // bytes of --checkpoint
   uint32_t kept_passes_ = 0;
   double kept_time_ = 0;
+  std::optional<io::FileError> checkpoint_error_;  // of the last that was to be written
   double read_seconds_ = 0, commit_seconds_ = 0, squares_seconds_ = 0;
 };
 

@@ -1,5 +1,6 @@
 """`lumicut render` in passes: stopped, killed, gone on; light groups mixed anew; illuminance."""
 import json
+import resource
 import signal
 import subprocess
 import time
@@ -54,11 +55,70 @@ class Progressive(Compared):
         other = lumicut(*arguments, "--resume", "--passes", "4", "--seed", "5")
         self.assertNotEqual(other.returncode, OK)
         self.assertIn("render.checkpoint", other.stderr)
-        self.assertIn("another scene, size, integrator or parameters", other.stderr)
+        self.assertIn("another scene, size, integrator or parameters: seed=1 instead of 5", other.stderr)
         kept.write_bytes(kept.read_bytes()[:-100])
         damaged = lumicut(*arguments, "--resume", "--passes", "4")
         self.assertNotEqual(damaged.returncode, OK)
         self.assertIn("cut short or damaged", damaged.stderr)
+
+    def test_a_checkpoint_that_holds_all_passes_gives_the_image(self):
+        whole, image, lights = (self.folder / name for name in ("whole.exr", "image.exr", "lights.vpl"))
+        kept = self.folder / "render.checkpoint"
+        render = ["render", SCENE, *SMALL, "--layers", "radiance,error", "--checkpoint", kept]
+        self.assert_ends(lumicut(*render, "--passes", "3", "-o", whole, "--vpl-out", lights), OK)
+        before, traced = kept.read_bytes(), lights.read_bytes()
+        lights.unlink()
+        # As when the run was killed, or the image's disk full, after the last pass.
+        result = lumicut(*render, "--passes", "3", "--resume", "-o", image, "--vpl-out", lights)
+        self.assert_ends(result, OK)
+        self.assertEqual(result.stderr, "")
+        self.assertEqual(self.difference(image, whole)["rmse"], 0)
+        self.assertEqual(self.difference(image, whole, "--layer", "error")["rmse"], 0)
+        self.assertEqual(lights.read_bytes(), traced)
+        self.assertEqual(kept.read_bytes(), before)
+        # Fewer were asked for: of what is held nothing can be taken away.
+        for passes in (["--passes", "2"], []):
+            image.unlink()
+            self.assert_ends(lumicut(*render, *passes, "--resume", "-o", image), OK,
+                             "render.checkpoint holds more passes than were asked for: the image is of all 3")
+            self.assertEqual(self.difference(image, whole)["rmse"], 0)
+        # A target that is reached, and a time that is over, ask for no more either.
+        nine = ["--passes", "9"]
+        self.assert_ends(lumicut(*render, *nine, "--resume", "-o", whole), OK)
+        for stop in (["--target-error", "1000"], ["--seconds", "1e-9"]):
+            result = lumicut(*render, *stop, "--resume", "-o", image)
+            self.assert_ends(result, OK)
+            self.assertEqual(result.stderr, "")
+            self.assertEqual(self.difference(image, whole)["rmse"], 0)
+
+    def test_a_checkpoint_that_cannot_be_written_is_noticed_before_the_first_pass(self):
+        image = self.folder / "a.exr"
+        endless = ["render", SCENE, *SMALL, "--passes", "1000000", "-o", image]
+        nowhere = lumicut(*endless, "--checkpoint", self.folder / "none" / "a.checkpoint")
+        self.assert_ends(nowhere, BAD_FILE, "none", "no place for a checkpoint", "does not exist")
+        # No file may be larger: a full disk that needs no disk. A checkpoint of 48x48 pixels takes 250 kB.
+        full = subprocess.run([COMMAND, *map(str, endless), "--checkpoint", self.folder / "a.checkpoint"],
+                              capture_output=True, text=True, timeout=300, restore_signals=False,
+                              preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100000, 100000)))
+        self.assert_ends(full, BAD_FILE, "a.checkpoint", "no place for a checkpoint", "cannot be written")
+        self.assertEqual(self.files(), [])
+
+    def test_a_checkpoint_that_fails_later_costs_no_image(self):
+        image, folder = self.folder / "a.exr", self.folder / "folder"
+        folder.mkdir()
+        kept = folder / "a.checkpoint"
+        process = subprocess.Popen([COMMAND, "render", SCENE, *SMALL, "--seconds", "3", "--checkpoint", kept, "-o", image],
+                                   stderr=subprocess.PIPE, text=True)
+        limit = time.monotonic() + 60
+        while not kept.exists() and process.poll() is None and time.monotonic() < limit:
+            time.sleep(0.005)
+        folder.rename(self.folder / "away")
+        _, told = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, BAD_FILE, told)
+        self.assertIn("the image will be written all the same", told)
+        self.assertEqual(told.count("the image will be written all the same"), 1)
+        self.assertEqual(self.difference(image, image)["rmse"], 0)
+        self.assertTrue((self.folder / "away" / "a.checkpoint").exists())
 
     def test_a_target_stops_when_the_error_is_reached(self):
         stats = self.folder / "stats.json"
