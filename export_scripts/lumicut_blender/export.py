@@ -299,20 +299,91 @@ def command_of(path, settings):
 
 
 def write_scene(path, data, width, height, settings):
-    """Writes PATH.json, PATH/meshes and PATH/textures beside their place first, then moves them there as a whole."""
+    """Writes NAME.json and NAME_files with meshes and textures. Files are written beside their place and moved there
+    under names that are free; the scene file, which takes the place of the earlier one at once, is the only file that
+    is replaced. So an export that fails or is killed leaves the earlier one whole. Then goes what the earlier export
+    wrote, as far as its manifest has it and it is unchanged; other files in NAME_files stay.
+    """
+    import fcntl
+
+    manifest_name = ".lumicut-export.json"
     path = pathlib.Path(path)
     if path.suffix.lower() != ".json":
         path = path.with_suffix(".json")
     if not path.parent.is_dir():
         raise ExportError(f"{path.parent} is no folder")
-    beside = pathlib.Path(tempfile.mkdtemp(prefix=f".{path.stem}.", dir=path.parent))
+    files = path.parent / f"{path.stem}_files"
+    target = pathlib.Path(os.path.realpath(path))  # a link stays
+    if target.exists() and not target.is_file():
+        raise ExportError(f"{path} is no plain file")
     try:
-        writer = Writer(beside, data, path.stem)
-        scene = writer.scene(width, height, settings)
-        files = f"{path.stem}_files"
+        made = not files.exists()
+        files.mkdir(exist_ok=True)
+    except FileExistsError:
+        raise ExportError(f"{files} stands already and is no folder") from None
+
+    def lock(folder):
+        """A descriptor that holds the folder's lock, or None: another export is at work in it."""
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return descriptor
+        except OSError:
+            os.close(descriptor)
+            return None
+
+    def stamp(file):
+        found = os.lstat(file)
+        return [found.st_size, found.st_mtime_ns]
+
+    def remove_earlier(kept):
+        """What earlier exports wrote, but for that in the folder `kept`."""
+        for manifest in [files / manifest_name, *files.glob(f"*/{manifest_name}")]:
+            folder = manifest.parent
+            if folder == kept or folder.is_symlink() or not manifest.is_file():
+                continue
+            try:
+                written = json.loads(manifest.read_text())["files"].items()
+                for name, old in written:
+                    file = folder / name
+                    inside = os.path.realpath(file).startswith(os.path.realpath(folder) + os.sep)
+                    if inside and file.is_file() and not file.is_symlink() and stamp(file) == old:
+                        file.unlink()
+                    for parent in list(file.parents)[:-1]:
+                        if inside and parent != folder and folder in parent.parents and not any(parent.iterdir()):
+                            parent.rmdir()
+                manifest.unlink()
+                if folder != files and not any(folder.iterdir()):
+                    folder.rmdir()
+            except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+                continue  # no manifest of ours: nothing in it is taken for ours
+
+    def remove_killed():
+        for folder in files.glob(".lumicut-*.part"):
+            held = lock(folder) if folder.is_dir() and not folder.is_symlink() else None
+            if held is not None:
+                shutil.rmtree(folder, ignore_errors=True)
+                os.close(held)
+
+    remove_killed()
+    beside = pathlib.Path(tempfile.mkdtemp(prefix=".lumicut-", suffix=".part", dir=files))
+    held, placed = lock(beside), []
+    try:
+        content = beside / "content"
+        content.mkdir()
+        scene = Writer(content, data, path.stem).scene(width, height, settings)
+        names = sorted(entry.name for entry in content.iterdir())
+        # In NAME_files itself, or in its first free numbered folder where an earlier export or another file stands.
+        place = files
+        if any(os.path.lexists(files / name) for name in [*names, manifest_name]):
+            number = 2
+            while os.path.lexists(files / str(number)):
+                number += 1
+            place = files / str(number)
+        prefix = place.relative_to(path.parent).as_posix()
 
         def moved(name):
-            return f"{files}/{name}"
+            return f"{prefix}/{name}"
 
         for mesh in scene["meshes"]:
             mesh["obj"] = moved(mesh["obj"])
@@ -326,15 +397,32 @@ def write_scene(path, data, width, height, settings):
         if "image" in scene.get("environment", {}):
             scene["environment"]["image"] = moved(scene["environment"]["image"])
         scene["description"] += ". As F12 renders it: " + " ".join(command_of(pathlib.Path(path.name), settings)[:8])
-        fresh = path.parent / f".{path.name}.new"
-        fresh.write_text(json.dumps(scene, indent=1) + "\n")
-        target = path.parent / files
+        fresh = beside / "scene.json"
+        fresh.write_text(json.dumps(scene, indent=1) + "\n", encoding="utf-8")
         if target.exists():
-            shutil.rmtree(target)
-        os.chmod(beside, 0o755)
-        beside.rename(target)
-        fresh.replace(path)
-    except BaseException:
+            os.chmod(fresh, target.stat().st_mode & 0o777)
+        written = sorted(file for file in content.rglob("*") if file.is_file())
+        (content / manifest_name).write_text(json.dumps(
+            {"files": {file.relative_to(content).as_posix(): stamp(file) for file in written}}, indent=1) + "\n")
+        for file in [*written, content / manifest_name, fresh]:  # on the disk before the scene file names them
+            with open(file, "rb") as stream:
+                os.fsync(stream.fileno())
+        if place != files:
+            placed.append(place)
+            content.rename(place)
+        else:
+            for name in [*names, manifest_name]:
+                placed.append(files / name)
+                (content / name).rename(files / name)
+        os.replace(fresh, target)
+        placed = []
+        remove_earlier(place)
+    finally:
+        for entry in placed:  # the scene file did not come to name them
+            shutil.rmtree(entry, ignore_errors=True) if entry.is_dir() else entry.unlink(missing_ok=True)
         shutil.rmtree(beside, ignore_errors=True)
-        raise
+        if held is not None:
+            os.close(held)
+        if made and not any(files.iterdir()):
+            files.rmdir()
     return path
