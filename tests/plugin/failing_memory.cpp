@@ -60,32 +60,32 @@ long live_blocks() { return live; }
 #define EXPORTED __attribute__((visibility("default")))
 extern "C" {
 
-EXPORTED void* malloc(size_t n) { return fails() ? nullptr : counted(__libc_malloc(n)); }
-EXPORTED void* calloc(size_t n, size_t each) { return fails() ? nullptr : counted(__libc_calloc(n, each)); }
-EXPORTED void* realloc(void* old, size_t n) {
+EXPORTED void* malloc(size_t n) noexcept { return fails() ? nullptr : counted(__libc_malloc(n)); }
+EXPORTED void* calloc(size_t n, size_t each) noexcept { return fails() ? nullptr : counted(__libc_calloc(n, each)); }
+EXPORTED void* realloc(void* old, size_t n) noexcept {
   if (fails()) return nullptr;
   return old == nullptr ? counted(__libc_malloc(n)) : __libc_realloc(old, n);
 }
-EXPORTED void* memalign(size_t alignment, size_t n) {
+EXPORTED void* memalign(size_t alignment, size_t n) noexcept {
   return fails() ? nullptr : counted(__libc_memalign(alignment, n));
 }
-EXPORTED void* aligned_alloc(size_t alignment, size_t n) { return memalign(alignment, n); }
-EXPORTED int posix_memalign(void** block, size_t alignment, size_t n) {
+EXPORTED void* aligned_alloc(size_t alignment, size_t n) noexcept { return memalign(alignment, n); }
+EXPORTED int posix_memalign(void** block, size_t alignment, size_t n) noexcept {
   void* const made = memalign(alignment, n);
   if (made == nullptr) return ENOMEM;
   *block = made;
   return 0;
 }
-EXPORTED void free(void* block) {
+EXPORTED void free(void* block) noexcept {
   if (block != nullptr) live.fetch_sub(1, std::memory_order_relaxed);
   __libc_free(block);
 }
 
 // What oneTBB takes from its own allocator, and takes from here where a program has these.
-EXPORTED void* scalable_malloc(size_t n) { return malloc(n); }
-EXPORTED void scalable_free(void* block) { free(block); }
-EXPORTED void* scalable_aligned_malloc(size_t n, size_t alignment) { return memalign(alignment, n); }
-EXPORTED void scalable_aligned_free(void* block) { free(block); }
+EXPORTED void* scalable_malloc(size_t n) noexcept { return malloc(n); }
+EXPORTED void scalable_free(void* block) noexcept { free(block); }
+EXPORTED void* scalable_aligned_malloc(size_t n, size_t alignment) noexcept { return memalign(alignment, n); }
+EXPORTED void scalable_aligned_free(void* block) noexcept { free(block); }
 
 EXPORTED void* mmap(void* at, size_t n, int protection, int flags, int file, off_t offset) noexcept {
   if (fails()) return MAP_FAILED;

@@ -323,7 +323,7 @@ typedef struct lumicut_vpl {
   float blend;        /* spot: smoothstep over this much of cosine */
   float spot_cosine;  /* spot: 1: times the cosine too */
   float spread_tan;   /* spot: narrowed area lamps fall off with max(0, 1 - spread_tan tan(theta)); 0: no */
-  uint32_t profile;   /* spot: name of a profile that a scene of this process was given, in place of this falloff; then blend,
+  uint32_t profile;   /* spot: name of a profile that a scene or lights of this process hold, in place of this falloff; then blend,
                          spot_cosine and spread_tan are its tangent, and intensity is that of its largest value; 0: none */
 } lumicut_vpl;
 enum { LUMICUT_VPL_OMNI = 0, LUMICUT_VPL_ORIENTED = 1, LUMICUT_VPL_DIRECTIONAL = 2, LUMICUT_VPL_SPOT = 3,
