@@ -267,7 +267,7 @@ void lead_lives(const std::function<void()>& life, bool all_after, long tries, b
   }
   const long lost = failing_memory::live_blocks() - blocks;
   // Caches of oneTBB and of the C library come and go; Embree keeps the allocator of each thread that built.
-  if (lost > lives + 20) complain("%ld blocks more than before %ld lives: some leak", lost, lives);
+  if (lost > lives + 200) complain("%ld blocks more than before %ld lives: some leak", lost, lives);
 }
 
 // The same in a process of its own: where that dies, this one tells at which allocation, and goes on behind it.
