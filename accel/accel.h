@@ -1,4 +1,4 @@
-// Ray tracing behind one interface: Embree, our agglomerative BVH, or the host's own callbacks.
+// Ray tracing behind one interface: our BVH, Embree, or the host's own callbacks.
 // Every call is a batch, so that no virtual call is paid per ray. All queries are [shared]: concurrent after build.
 #pragma once
 
@@ -16,6 +16,9 @@
 namespace lumicut {
 
 inline constexpr uint32_t kNoId = 0xffffffffu;
+
+// What a scene's coordinates keep to: the difference of two is the direction of a ray that every accel takes.
+inline constexpr float kLargestCoordinate = 9e17f;
 
 // Fields in Embree's order (RTCRay). `dir` need not be a unit vector; distances are in units of its length.
 struct Ray {
@@ -75,7 +78,7 @@ struct AccelGeometry {
 
 struct AccelOptions {
   bool robust = true;        // watertight on shared edges
-  std::string builder = "";  // agglomerative accel only: see accel/bvh.h; empty: its default
+  std::string builder = "";  // "bvh" alone: see build_options_of in accel/bvh_build.h; empty: its default
 };
 
 // What a build gave. Costs as in [Walter et al. 2008, Fig. 6]; 0 where the accel does not compute them.
@@ -90,7 +93,7 @@ class Accel {
   virtual ~Accel() = default;
   virtual AccelInfo info() const = 0;
 
-  // Closest hits. Rays with NaN fields hit nothing.
+  // Closest hits. Rays with NaN fields, or an origin or direction past 1.844e18, hit nothing.
   virtual void intersect(std::span<RayHit> rays) const = 0;
 
   // Any hit: sets tfar to -inf where something lies in (tnear, tfar).
@@ -104,7 +107,11 @@ class Accel {
                                    const float* pz, size_t n, uint8_t* occluded) const = 0;
 };
 
-// Makes the accel of that name: "embree" or "agglomerative". Runs on the caller's arena. Throws Error on an unknown
+inline constexpr const char* kDefaultAccel = "bvh";
+// "bvh" or "embree", of a name that a caller gave: "agglomerative" is an earlier one of "bvh". Throws Error on any other.
+std::string accel_kind_of(const std::string& name);
+
+// Makes the accel of that name. Runs on the caller's arena. Throws Error on an unknown
 // name, an index out of range, or a position that is not finite (naming mesh, index and value), and Error(cancelled).
 std::unique_ptr<Accel> make_accel(const std::string& name, const AccelGeometry& geometry, const AccelOptions& options,
                                   Progress* progress = nullptr);

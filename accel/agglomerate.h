@@ -17,8 +17,9 @@ enum class Strategy : uint8_t {
   naive,            // Fig. 2: all pairs, each time. O(N³): the oracle of tests
   heap,             // Fig. 3: best-match tree and a lazy heap
   locally_ordered,  // Fig. 4: nearest-neighbour chain, one thread
-  parallel,  // sec. 3.3's aim by other means: rounds in which all mutual best matches merge at once, on the caller's
-             // arena
+  // sec. 3.3's aim by other means: chains at once in regions of space, each of which rests where a best match lies
+  // outside; then in new regions over what is left; the last on one thread. On the caller's arena.
+  parallel,
 };
 
 // Two clusters become one. Ids below N are leaves, id N+k is merge k; children come before their parent.

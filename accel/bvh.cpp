@@ -16,12 +16,6 @@ struct Primitive {
   uint32_t mesh, prim;
 };
 
-bool in_range(const Triangle& t) {
-  const float reach =
-      std::max({max_component(max(t.v0, -t.v0)), max_component(max(t.v1, -t.v1)), max_component(max(t.v2, -t.v2))});
-  return reach <= kHugeCoordinate;
-}
-
 struct Built {
   Tree tree;
   WideBvh wide;
@@ -47,6 +41,7 @@ Built build_meshes(const AccelGeometry& geometry, std::span<const uint32_t> mesh
   std::vector<Aabb> boxes(primitives.size());
   std::vector<float> areas(primitives.size());
   parallel_chunks(primitives.size(), 16384, [&](size_t begin, size_t end) {
+    if (progress != nullptr) progress->check();
     for (size_t i = begin; i < end; ++i) {
       const Triangle t = triangle_of(geometry.meshes[primitives[i].mesh], primitives[i].prim);
       boxes[i].extend(t.v0), boxes[i].extend(t.v1), boxes[i].extend(t.v2);
@@ -120,6 +115,8 @@ std::unique_ptr<Bvh> Bvh::from_geometry(const AccelGeometry& geometry, const Acc
   } else {
     bvh->meshes_.resize(geometry.meshes.size());
     bvh->instances_.resize(geometry.instances.size());
+    const Inverses inverses = invert_instances(geometry);
+    bvh->scene_.limits = inverses.limits;
     std::vector<uint8_t> made(geometry.meshes.size(), 0);
     std::vector<Aabb> boxes;
     std::vector<uint32_t> ids;
@@ -127,7 +124,8 @@ std::unique_ptr<Bvh> Bvh::from_geometry(const AccelGeometry& geometry, const Acc
       const InstanceView& instance = geometry.instances[i];
       TraceScene::Instance& out = bvh->instances_[i];
       if (progress != nullptr) progress->check();
-      if (!invert(instance.to_world, out.inverse)) continue;
+      if (!inverses.of[i]) continue;
+      out.inverse = *inverses.of[i];
       if (made[instance.mesh] == 0) {
         made[instance.mesh] = 1;
         Built built = build_meshes(geometry, {&instance.mesh, 1}, options, build, progress, false);

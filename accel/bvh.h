@@ -1,4 +1,5 @@
-// The agglomerative BVH: a binary tree over triangles or boxes, collapsed to eight-wide nodes, and its traversal.
+// Our BVH: a binary tree over triangles or boxes by any of the builders, collapsed to eight-wide nodes, and its
+// traversal.
 #pragma once
 
 #include <memory>

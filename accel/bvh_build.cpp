@@ -515,16 +515,15 @@ int depth_of(const Tree& tree) {
 }  // namespace
 
 BuildOptions build_options_of(const std::string& text) {
-  if (text.empty()) return build_options_of("buckets+reinsert:5x3");
+  if (text.empty()) return build_options_of(kDefaultBuilder);
   BuildOptions options;
   const size_t plus = text.find('+');
   const std::string name = text.substr(0, plus);
-  constexpr std::pair<const char*, Builder> kNames[] = {{"agglomerative", Builder::agglomerative},
-                                                        {"parallel", Builder::parallel},
-                                                        {"buckets", Builder::buckets},
-                                                        {"binned", Builder::binned},
-                                                        {"binned-longest", Builder::binned_longest},
-                                                        {"sweep", Builder::sweep}};
+  constexpr std::pair<const char*, Builder> kNames[] = {
+      {"agglomerative", Builder::agglomerative},     {"agglomerative-parallel", Builder::agglomerative_parallel},
+      {"parallel", Builder::agglomerative_parallel}, {"binned-agglomerative", Builder::binned_agglomerative},
+      {"buckets", Builder::binned_agglomerative},    {"binned", Builder::binned},
+      {"binned-longest", Builder::binned_longest},   {"sweep", Builder::sweep}};
   bool known = false;
   for (const auto& [n, builder] : kNames)
     if (name == n) options.builder = builder, known = true;
@@ -548,10 +547,10 @@ BuildOptions build_options_of(const std::string& text) {
     options.reinsert_passes = passes;
   }
   if (!known)
-    fail_argument(
-        "builder '" + text +
-        "' is none of agglomerative, parallel, buckets, binned, binned-longest, sweep, with or without '+reinsert', "
-        "'+reinsert:PERCENT' or '+reinsert:PERCENTxPASSES'");
+    fail_argument("builder '" + text +
+                  "' is none of agglomerative, agglomerative-parallel, binned-agglomerative, binned, binned-longest, "
+                  "sweep, with or without '+reinsert', "
+                  "'+reinsert:PERCENT' or '+reinsert:PERCENTxPASSES'");
   return options;
 }
 
@@ -567,14 +566,15 @@ Tree build_tree(std::span<const Aabb> boxes, const BuildOptions& options, Progre
   }
   switch (options.builder) {
     case Builder::agglomerative:
-    case Builder::parallel: {
+    case Builder::agglomerative_parallel: {
       std::vector<uint32_t> prims(boxes.size());
       std::iota(prims.begin(), prims.end(), 0u);
-      const Strategy strategy = options.builder == Builder::parallel ? Strategy::parallel : Strategy::locally_ordered;
+      const Strategy strategy =
+          options.builder == Builder::agglomerative_parallel ? Strategy::parallel : Strategy::locally_ordered;
       place_merges(agglomerate_boxes(boxes, strategy, progress), prims, boxes, tree, {0, 1, 0});
       break;
     }
-    case Builder::buckets:
+    case Builder::binned_agglomerative:
       BinnedBuilder(boxes, tree, true, true, progress).build();
       break;
     case Builder::binned:

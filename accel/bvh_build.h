@@ -27,25 +27,27 @@ struct Tree {
 };
 
 enum class Builder : uint8_t {
-  agglomerative,   // exact, locally ordered, one thread
-  parallel,        // the same tree, on the caller's arena
-  buckets,         // binned SAH down to 4096 primitives, exact agglomeration in each bucket, on the caller's arena
-  binned,          // divisive, 16 bins on each of 3 axes. [Wald 2007]
-  binned_longest,  // divisive, 16 bins on the longest axis: the rival of Walter et al. 2008
-  sweep,           // divisive, every split of 3 axes
+  agglomerative,           // exact, locally ordered, one thread
+  agglomerative_parallel,  // the same tree, on the caller's arena
+  binned_agglomerative,    // binned SAH down to 4096 primitives, exact agglomeration below, on the caller's arena
+  binned,                  // divisive, 16 bins on each of 3 axes. [Wald 2007]
+  binned_longest,          // divisive, 16 bins on the longest axis: the rival of Walter et al. 2008
+  sweep,                   // divisive, every split of 3 axes
 };
 
 struct BuildOptions {
-  Builder builder = Builder::buckets;
+  Builder builder = Builder::binned_agglomerative;
   // Reinsertion optimisation afterwards: passes over this share of the largest nodes. [Bittner et al. 2013; Meister and
   // Bittner 2018]
   float reinsert_share = 0.0f;
   int reinsert_passes = 0;
 };
 
-// "agglomerative", "parallel", "buckets", "binned", "binned-longest" or "sweep"; then, optionally, "+reinsert" (20 % in
-// 8 passes) or "+reinsert:P" with P the percentage, or "+reinsert:PxN" with N passes. "": the default,
-// "buckets+reinsert:5x3". Throws Error on anything else.
+// A builder's name: "agglomerative", "agglomerative-parallel", "binned-agglomerative", "binned", "binned-longest" or
+// "sweep" ("parallel" and "buckets" are earlier names of the second and the third); then, optionally, "+reinsert" (20 %
+// in 8 passes) or "+reinsert:P" with P the percentage, or "+reinsert:PxN" with N passes. "": kDefaultBuilder. Throws
+// Error on anything else.
+inline constexpr const char* kDefaultBuilder = "binned-agglomerative+reinsert:5x3";
 BuildOptions build_options_of(const std::string& text);
 
 // Depth of no tree exceeds this: what lies deeper is split by halves. Agglomeration alone may be as deep as N.

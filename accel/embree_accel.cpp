@@ -114,7 +114,7 @@ class EmbreeAccel final : public Accel {
     RTCRayHit local{};  // Embree wants 16-byte alignment, which a host's array need not have
     for (RayHit& r : rays) {
       r.hit = {};
-      if (!is_traceable(r.ray)) continue;
+      if (!is_traceable(r.ray, limits_)) continue;
       std::memcpy(static_cast<void*>(&local), &r, sizeof(r));
       local.ray.tnear = std::max(local.ray.tnear, 0.0f);
       context.intersect(scene_, &local);
@@ -127,7 +127,7 @@ class EmbreeAccel final : public Accel {
     embree::Context context(false);
     RTCRay local;
     for (Ray& r : rays) {
-      if (!is_traceable(r)) continue;
+      if (!is_traceable(r, limits_)) continue;
       std::memcpy(&local, &r, sizeof(local));
       local.tnear = std::max(local.tnear, 0.0f);
       context.occluded(scene_, &local);
@@ -140,12 +140,11 @@ class EmbreeAccel final : public Accel {
     embree::Context context(coherent_);
     constexpr size_t kWidth = 16;
     Packet<kWidth> packet;
-    const bool sound = (light.x + light.y + light.z) * 0.0f == 0.0f;
+    const bool sound = within(light, directional ? limits_.direction : limits_.origin);
+    const float limit = directional ? limits_.origin : limits_.direction;
     // What all rays share is written once: Embree changes tfar alone.
     for (size_t i = 0; i < kWidth; ++i) {
-      packet.org_x[i] = packet.dir_x[i] = light.x;
-      packet.org_y[i] = packet.dir_y[i] = light.y;
-      packet.org_z[i] = packet.dir_z[i] = light.z;
+      for (int axis = 0; axis < 3; ++axis) packet.org[axis][i] = packet.dir[axis][i] = light[axis];
       packet.tnear[i] = packet.time[i] = 0.0f;
       packet.mask[i] = 0xffffffffu, packet.id[i] = packet.flags[i] = 0;
     }
@@ -161,19 +160,19 @@ class EmbreeAccel final : public Accel {
           x[i] = px[at], y[i] = py[at], z[i] = pz[at];
         }
       }
-      // Zero times anything that is not finite is not zero.
-      for (size_t i = 0; i < kWidth; ++i) packet.valid[i] = (x[i] + y[i] + z[i]) * 0.0f == 0.0f ? -1 : 0;
-      for (size_t i = 0; i < kWidth; ++i) {
-        if (i >= count || !sound) packet.valid[i] = 0;
-        packet.tfar[i] = reach;
-      }
       if (directional) {
-        for (size_t i = 0; i < kWidth; ++i) packet.org_x[i] = x[i], packet.org_y[i] = y[i], packet.org_z[i] = z[i];
+        for (size_t i = 0; i < kWidth; ++i) packet.org[0][i] = x[i], packet.org[1][i] = y[i], packet.org[2][i] = z[i];
       } else {
         for (size_t i = 0; i < kWidth; ++i)
-          packet.dir_x[i] = x[i] - light.x, packet.dir_y[i] = y[i] - light.y, packet.dir_z[i] = z[i] - light.z;
+          packet.dir[0][i] = x[i] - light.x, packet.dir[1][i] = y[i] - light.y, packet.dir[2][i] = z[i] - light.z;
       }
-      context.occluded16(packet.valid, scene_, reinterpret_cast<RTCRay16*>(packet.org_x));
+      const float(&changing)[3][kWidth] = directional ? packet.org : packet.dir;
+      for (size_t i = 0; i < kWidth; ++i) {
+        const bool valid = i < count && sound && within({changing[0][i], changing[1][i], changing[2][i]}, limit);
+        packet.valid[i] = valid ? -1 : 0;
+        packet.tfar[i] = reach;
+      }
+      context.occluded16(packet.valid, scene_, reinterpret_cast<RTCRay16*>(packet.org));
       for (size_t i = 0; i < count; ++i)
         out[begin + i] = packet.valid[i] != 0 && packet.tfar[i] == -std::numeric_limits<float>::infinity();
     }
@@ -183,7 +182,7 @@ class EmbreeAccel final : public Accel {
   // RTCRayN: twelve arrays in RTCRay's order.
   template <size_t N>
   struct alignas(64) Packet {
-    float org_x[N], org_y[N], org_z[N], tnear[N], dir_x[N], dir_y[N], dir_z[N], time[N], tfar[N];
+    float org[3][N], tnear[N], dir[3][N], time[N], tfar[N];
     uint32_t mask[N], id[N], flags[N];
     int valid[N];
   };
@@ -247,11 +246,12 @@ class EmbreeAccel final : public Accel {
         info_.triangles += geometry.meshes[m].triangle_count;
       }
     } else {
+      const Inverses inverses = invert_instances(geometry);
+      limits_ = inverses.limits;
       std::vector<RTCScene> inner(geometry.meshes.size(), nullptr);
       for (uint32_t i = 0; i < geometry.instances.size(); ++i) {
         const InstanceView& instance = geometry.instances[i];
-        Transform inverse;
-        if (geometry.meshes[instance.mesh].triangle_count == 0 || !invert(instance.to_world, inverse)) continue;
+        if (geometry.meshes[instance.mesh].triangle_count == 0 || !inverses.of[i]) continue;
         if (inner[instance.mesh] == nullptr) {
           inner[instance.mesh] = new_scene(options);
           add_mesh(inner[instance.mesh], geometry, instance.mesh);
@@ -305,6 +305,7 @@ class EmbreeAccel final : public Accel {
   // stack that it never wrote (AVX-512): it may never end. Without instances coherent packets are right, and 1.1 to 1.4
   // times as fast.
   bool coherent_ = false;
+  RayLimits limits_;
   std::vector<RTCScene> scenes_;
   std::vector<FilterUser> filters_;
   AccelInfo info_;

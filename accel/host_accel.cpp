@@ -63,7 +63,7 @@ class HostAccel final : public Accel {
  private:
   static bool is_traceable_to(Ray ray, float limit) {
     ray.tfar = limit;
-    return is_traceable(ray);
+    return is_traceable(ray, {});
   }
 
   void check(const RayHit& r, float limit) const {

@@ -44,49 +44,70 @@ void validate(const AccelGeometry& geometry, Progress* progress) {
   }
 }
 
-bool invert(const Transform& transform, Transform& inverse) {
-  const float* m = transform.m;
-  const Vec3d a{m[0], m[1], m[2]}, b{m[4], m[5], m[6]}, c{m[8], m[9], m[10]};
-  const Vec3d bc = cross(b, c), ca = cross(c, a), ab = cross(a, b);
-  const double det = dot(a, bc);
-  if (!(std::abs(det) > 0.0)) return false;
-  const Vec3d t{m[3], m[7], m[11]};
-  for (int row = 0; row < 3; ++row) {
-    const Vec3d r = Vec3d{bc[row], ca[row], ab[row]} / det;
-    for (int k = 0; k < 3; ++k) inverse.m[4 * row + k] = static_cast<float>(r[k]);
-    inverse.m[4 * row + 3] = static_cast<float>(-dot(r, t));
-  }
-  for (const float v : inverse.m)
-    if (!std::isfinite(v)) return false;
-  return true;
-}
-
 Aabb bounds_of(const AccelGeometry& geometry) {
   std::vector<Aabb> boxes(geometry.meshes.size());
   for (size_t m = 0; m < boxes.size(); ++m)
-    for (size_t i = 0; i < 3 * geometry.meshes[m].triangle_count; ++i)
-      boxes[m].extend(geometry.meshes[m].positions[geometry.meshes[m].indices[i]]);
+    for (size_t i = 0; i < geometry.meshes[m].triangle_count; ++i)
+      if (const Triangle t = triangle_of(geometry.meshes[m], i); in_range(t))
+        boxes[m].extend(t.v0), boxes[m].extend(t.v1), boxes[m].extend(t.v2);
   Aabb all;
   if (geometry.instances.empty())
     for (const Aabb& box : boxes) all.extend(box);
   for (const InstanceView& instance : geometry.instances) {
     const Aabb& box = boxes[instance.mesh];
     if (box.empty()) continue;
+    Aabb moved;
     for (int corner = 0; corner < 8; ++corner)
-      all.extend(instance.to_world.point(
+      moved.extend(instance.to_world.point(
           {corner & 1 ? box.hi.x : box.lo.x, corner & 2 ? box.hi.y : box.lo.y, corner & 4 ? box.hi.z : box.lo.z}));
+    if (within(moved.lo, kHugeCoordinate) && within(moved.hi, kHugeCoordinate)) all.extend(moved);
   }
   return all;
 }
 
+Inverses invert_instances(const AccelGeometry& geometry) {
+  Inverses out;
+  const Aabb bounds = bounds_of(geometry);
+  const double reach = bounds.empty() ? 0.0 : double{max_component(max(bounds.hi, -bounds.lo))};
+  double origin = kHugeCoordinate, direction = kHugeCoordinate;
+  for (const InstanceView& instance : geometry.instances) {
+    out.of.emplace_back();
+    const float* m = instance.to_world.m;
+    const Vec3d a{m[0], m[1], m[2]}, b{m[4], m[5], m[6]}, c{m[8], m[9], m[10]}, t{m[3], m[7], m[11]};
+    const Vec3d bc = cross(b, c), ca = cross(c, a), ab = cross(a, b);
+    const double det = dot(a, bc);
+    if (!(std::abs(det) > 0.0)) continue;
+    Transform inverse;
+    double stretch = 0.0, moved = 0.0;  // a coordinate grows to at most stretch * coordinate + moved
+    for (int row = 0; row < 3; ++row) {
+      const Vec3d r = Vec3d{bc[row], ca[row], ab[row]} / det;
+      for (int k = 0; k < 3; ++k) inverse.m[4 * row + k] = static_cast<float>(r[k]);
+      inverse.m[4 * row + 3] = static_cast<float>(-dot(r, t));
+      stretch = std::max(stretch, std::abs(r.x) + std::abs(r.y) + std::abs(r.z));
+      moved = std::max(moved, std::abs(dot(r, t)));
+    }
+    // A hair less, for the rounding of single precision.
+    constexpr double kRoom = 0.999999 * kHugeCoordinate;
+    if (!(stretch * reach + moved < kRoom)) continue;
+    out.of.back() = inverse;
+    origin = std::min(origin, (kRoom - moved) / stretch);
+    direction = std::min(direction, kRoom / stretch);
+  }
+  out.limits = {static_cast<float>(origin), static_cast<float>(direction)};
+  return out;
+}
+
+std::string accel_kind_of(const std::string& name) {
+  if (name == "bvh" || name == "agglomerative") return "bvh";
+  if (name == "embree") return name;
+  fail_argument("accel '" + name + "' is neither 'bvh' nor 'embree'");
+}
+
 std::unique_ptr<Accel> make_accel(const std::string& name, const AccelGeometry& geometry, const AccelOptions& options,
                                   Progress* progress) {
-  if (name == "agglomerative") return Bvh::from_geometry(geometry, options, progress);
-  if (name == "embree") {
-    validate(geometry, progress);
-    return make_embree_accel(geometry, options, progress);
-  }
-  fail_argument("accel: no accel is called '" + name + "'; there are 'embree' and 'agglomerative'");
+  if (accel_kind_of(name) == "bvh") return Bvh::from_geometry(geometry, options, progress);
+  validate(geometry, progress);
+  return make_embree_accel(geometry, options, progress);
 }
 
 }  // namespace lumicut

@@ -772,6 +772,7 @@ HWY_NOINLINE void points_of(const TraceScene& scene, const Vec3f& light, const f
     const DN d;
     constexpr size_t kLanes = hn::MaxLanes(DN());
     const VN zero = hn::Zero(d), tiny = hn::Set(d, 1e-18f);
+    const VN limit = hn::Set(d, kSun ? scene.limits.origin : scene.limits.direction);
     for (size_t i = 0; i < count; i += kLanes) {
       const size_t here = std::min(kLanes, count - i);
       const auto there = hn::FirstN(d, here);
@@ -792,8 +793,9 @@ HWY_NOINLINE void points_of(const TraceScene& scene, const Vec3f& light, const f
       } else {
         for (int axis = 0; axis < 3; ++axis) hn::Store(p[axis], d, b.o[axis] + i);
       }
-      // Zero times anything that is not finite is not zero; a segment without length meets nothing.
-      auto sound = hn::And(there, hn::Eq(hn::Mul(hn::Add(p[0], hn::Add(p[1], p[2])), zero), zero));
+      // NaN passes no comparison; a segment without length meets nothing.
+      auto sound = there;
+      for (const VN& component : p) sound = hn::And(sound, hn::Le(hn::Abs(component), limit));
       if constexpr (!kSun) {
         const VN length = hn::Max(hn::Abs(p[0]), hn::Max(hn::Abs(p[1]), hn::Abs(p[2])));
         sound = hn::And(sound, hn::Gt(length, zero));
@@ -812,14 +814,15 @@ void closest_of(const TraceScene& scene, RayHit* rays, size_t n) {
   for (size_t i = 0; i < n; ++i) {
     RayHit& r = rays[i];
     r.hit = {};
-    if (is_traceable(r.ray) && r.ray.mask != 0) closest_hit<C>(scene, *scene.top, kNoId, r.ray.org, r.ray.dir, r);
+    if (is_traceable(r.ray, scene.limits) && r.ray.mask != 0)
+      closest_hit<C>(scene, *scene.top, kNoId, r.ray.org, r.ray.dir, r);
   }
 }
 template <class C>
 void any_of(const TraceScene& scene, Ray* rays, size_t n) {
   for (size_t i = 0; i < n; ++i) {
     Ray r = rays[i];
-    if (!is_traceable(r) || r.mask == 0) continue;
+    if (!is_traceable(r, scene.limits) || r.mask == 0) continue;
     r.tnear = std::max(r.tnear, 0.0f);
     if (any_hit<C>(scene, *scene.top, scene.top->root, r)) rays[i].tfar = -kInf;
   }
@@ -891,8 +894,8 @@ void trace_any(const TraceScene& scene, std::span<Ray> rays) {
 
 void trace_points(const TraceScene& scene, const Vec3f& light, bool directional, const float* px, const float* py,
                   const float* pz, size_t n, uint8_t* occluded) {
-  const float sum = (light.x + light.y + light.z) * 0.0f;
-  if (scene.top->root == kEmptyChild || sum != 0.0f || (directional && light == Vec3f{})) {
+  const bool sound = within(light, directional ? scene.limits.direction : scene.limits.origin);
+  if (scene.top->root == kEmptyChild || !sound || (directional && light == Vec3f{})) {
     std::fill_n(occluded, n, uint8_t{0});
     return;
   }

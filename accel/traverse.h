@@ -5,6 +5,7 @@
 #include <span>
 
 #include "accel/accel.h"
+#include "accel/validate.h"
 #include "accel/wide_bvh.h"
 
 namespace lumicut {
@@ -24,6 +25,7 @@ struct TraceScene {
   bool boxes = false;  // leaves hold boxes, not triangles
   bool masks = false;  // some mesh has a mask that is not all ones
   bool instanced = false;
+  RayLimits limits;
 };
 
 void trace_closest(const TraceScene& scene, std::span<RayHit> rays);

@@ -1,6 +1,9 @@
 // What every room behind make_accel checks before it builds, and before it traces.
 #pragma once
 
+#include <cmath>
+#include <optional>
+
 #include "accel/accel.h"
 
 namespace lumicut {
@@ -20,16 +23,34 @@ inline Triangle triangle_of(const MeshView& mesh, size_t prim) {
   return {mesh.positions[i[0]], mesh.positions[i[1]], mesh.positions[i[2]]};
 }
 
-// Inverse of an affine map, computed in double. False when it flattens space: such an instance has nothing to hit.
-bool invert(const Transform& transform, Transform& inverse);
+// False past kHugeCoordinate, and of NaN.
+inline bool within(const Vec3f& v, float limit) {
+  return std::abs(v.x) <= limit && std::abs(v.y) <= limit && std::abs(v.z) <= limit;
+}
+inline bool in_range(const Triangle& t) {
+  return within(t.v0, kHugeCoordinate) && within(t.v1, kHugeCoordinate) && within(t.v2, kHugeCoordinate);
+}
 
-// Bounds of all meshes, each through its instances.
+// Bounds of all meshes, each through its instances, without what lies out of range.
 Aabb bounds_of(const AccelGeometry& geometry);
 
-// Rays with NaN anywhere, or an origin or direction at infinity, hit nothing; so do rays without a range.
-inline bool is_traceable(const Ray& r) {
-  const float sum = (r.org.x + r.org.y + r.org.z) * 0.0f + (r.dir.x + r.dir.y + r.dir.z) * 0.0f;
-  return sum == 0.0f && r.tnear <= r.tfar && r.tfar >= 0.0f;
+// How far the origins and directions of rays may reach: kHugeCoordinate, in the space of each instance too. Embree ends
+// the process on rays past it where it is built with its assertions.
+struct RayLimits {
+  float origin = kHugeCoordinate, direction = kHugeCoordinate;
+};
+
+// World to mesh of each instance, computed in double; nothing where it flattens space, in so far as single precision
+// tells: what lies in the scene's bounds has no place in the mesh's space. Such an instance has nothing to hit.
+struct Inverses {
+  std::vector<std::optional<Transform>> of;
+  RayLimits limits;
+};
+Inverses invert_instances(const AccelGeometry& geometry);
+
+// Rays with NaN anywhere, or past the limits, hit nothing; so do rays without a range.
+inline bool is_traceable(const Ray& r, const RayLimits& limits) {
+  return within(r.org, limits.origin) && within(r.dir, limits.direction) && r.tnear <= r.tfar && r.tfar >= 0.0f;
 }
 
 }  // namespace lumicut

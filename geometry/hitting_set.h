@@ -2,7 +2,8 @@
 //
 // The default solver is not the thesis's: dominance reduction, greedy, pruning, Lagrangian lower bound, and the (2,1)
 // and (3,2) local search of ch. 8, which beats the rounding algorithm (dnet.h) wherever incidence lists fit in memory.
-// Where they do not, it solves a growing sample of the disks, and adds those it misses until none is left.
+// Where they do not, the points are thinned to candidates along the tree's order, with one for each disk that would be
+// left without, and the same solver runs on what those hold.
 #pragma once
 
 #include <cstddef>

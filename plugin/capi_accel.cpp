@@ -3,6 +3,7 @@
 
 #include "accel/bvh.h"
 #include "plugin/check.h"
+#include "plugin/convert.h"
 #include "plugin/descriptors.h"
 #include "plugin/objects.h"
 
@@ -67,19 +68,18 @@ lumicut_result lumicut_accel_build(lumicut_device device, const lumicut_accel_de
     const lumicut_accel_desc in = read(desc);
     const Checked c("lumicut_accel_desc");
     if (accel == nullptr) fail_argument("lumicut_accel_build: accel is NULL");
-    c.integer("robust", in.robust, 0, 1);
+    const Scene::Config config = to_accel("lumicut_accel_desc", in.robust, in.kind, in.builder);
+    const std::string& kind = config.accel;
+    const AccelOptions options{config.robust, config.builder};
     check_array(c, "positions", in.positions, "position_count", in.position_count);
     check_array(c, "indices", in.indices, "triangle_count", in.triangle_count);
     check_array(c, "boxes", in.boxes, "box_count", in.box_count);
     if (in.box_count > 0 && in.triangle_count > 0)
       c.fail("boxes", "are given beside triangles; one accel holds one of them");
-    const std::string kind = in.kind == nullptr ? "agglomerative" : in.kind;
     if (kind == "embree" && in.box_count > 0) c.fail_unknown("boxes", "\"embree\" holds triangles alone");
-    if (kind == "embree" && in.builder != nullptr) c.fail_unknown("builder", "\"embree\" has one builder of its own");
 
     auto made = std::make_unique<lumicut_accel_t>();
     made->device = Ref(d);
-    const AccelOptions options{in.robust != 0, in.builder == nullptr ? "" : in.builder};
     const auto keep_bvh = [&](std::unique_ptr<Bvh> bvh) {
       made->bvh = bvh.get();
       made->accel = std::move(bvh);
@@ -97,7 +97,7 @@ lumicut_result lumicut_accel_build(lumicut_device device, const lumicut_accel_de
       geometry.meshes.push_back(
           {made->positions.data(), made->positions.size(), made->indices.data(), in.triangle_count});
       d.arena.run([&] {
-        if (kind == "agglomerative")
+        if (kind == "bvh")
           keep_bvh(Bvh::from_geometry(geometry, options, nullptr, true));
         else
           made->accel = make_accel(kind, geometry, options);

@@ -33,13 +33,8 @@ lumicut_result lumicut_scene_create(lumicut_device device, const lumicut_scene_d
   return guard([&] {
     lumicut_device_t& d = object(device);
     const lumicut_scene_desc in = desc == nullptr ? lumicut_scene_desc{} : read(desc);
-    const Checked c("lumicut_scene_desc");
     if (scene == nullptr) fail_argument("lumicut_scene_create: scene is NULL");
-    c.integer("robust", in.robust, 0, 1);
-    const std::string accel = in.accel == nullptr ? "embree" : in.accel;
-    if (accel != "embree" && accel != "agglomerative")
-      c.fail("accel", "\"" + accel + "\" is neither \"embree\" nor \"agglomerative\"");
-    *scene = new lumicut_scene_t(d, {accel, in.robust != 0});
+    *scene = new lumicut_scene_t(d, to_accel("lumicut_scene_desc", in.robust, in.accel, in.builder));
   });
 }
 

@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "accel/accel.h"
 #include "core/vec.h"
 
 namespace lumicut {
@@ -32,6 +33,13 @@ class Checked {
   }
   void finite(const char* name, const float (&v)[3]) const {
     for (int i = 0; i < 3; ++i) finite(name, v[i], i);
+  }
+  // Of a place or a length in the world.
+  void coordinate(const char* name, float v, int64_t k = -1) const {
+    if (!(std::abs(v) <= kLargestCoordinate)) range(name, v, -kLargestCoordinate, kLargestCoordinate, k);
+  }
+  void coordinate(const char* name, const float (&v)[3]) const {
+    for (int i = 0; i < 3; ++i) coordinate(name, v[i], i);
   }
   // In [low, high]; NaN never is. An infinite `high` stands for "finite".
   void range(const char* name, float v, float low, float high, int64_t k = -1) const {

@@ -4,6 +4,7 @@
 
 #include <numbers>
 
+#include "accel/bvh_build.h"
 #include "core/parallel.h"
 #include "plugin/check.h"
 #include "plugin/descriptors.h"
@@ -41,6 +42,18 @@ const char* type_name(uint32_t type) {
 }
 
 }  // namespace
+
+Scene::Config to_accel(const char* owner, uint32_t robust, const char* kind, const char* builder) {
+  const Checked c(owner);
+  c.integer("robust", robust, 0, LUMICUT_FAST);
+  Scene::Config out;
+  out.robust = robust != LUMICUT_FAST;
+  if (kind != nullptr) out.accel = accel_kind_of(kind);
+  if (builder == nullptr) return out;
+  if (out.accel == "embree") c.fail_unknown("builder", "\"embree\" has one builder of its own");
+  build_options_of(out.builder = builder);
+  return out;
+}
 
 Texture to_texture(const lumicut_texture& in, uint64_t index) {
   const Checked c("lumicut_texture", index);
@@ -124,7 +137,7 @@ std::vector<Vec3f> to_positions(const float* xyz, uint64_t count, const char* ow
   std::vector<Vec3f> out = to_normals(xyz, count);
   for (uint64_t i = 0; i < out.size(); ++i)
     if (!is_finite(out[i]))
-      for (int k = 0; k < 3; ++k) Checked(owner).finite("positions", out[i][k], static_cast<int64_t>(3 * i) + k);
+      for (int k = 0; k < 3; ++k) Checked(owner).coordinate("positions", out[i][k], static_cast<int64_t>(3 * i) + k);
   return out;
 }
 
@@ -214,10 +227,10 @@ Light to_light(const lumicut_light& in, uint64_t index, const std::vector<Profil
   light.type = static_cast<LightType>(in.type);
   light.group = in.group;
   if (!sun) {
-    c.finite("position", in.position);
+    c.coordinate("position", in.position);
     light.position = vec(in.position);
   }
-  if (point || spot) c.not_negative("radius", in.radius);
+  if (point || spot) c.range("radius", in.radius, 0.0f, kLargestCoordinate);
   if (sun) c.range("radius", in.radius, 0.0f, 0.5f * kPi);
   if (!area) light.radius = in.radius;
   if (spot || sun) light.direction = c.direction("direction", in.direction);
@@ -248,8 +261,8 @@ Light to_light(const lumicut_light& in, uint64_t index, const std::vector<Profil
     light.tangent = given != Vec3f{} ? normalize(across) : Frame(light.direction).t;
   }
   if (area) {
-    c.finite("u", in.u);
-    c.finite("v", in.v);
+    c.coordinate("u", in.u);
+    c.coordinate("v", in.v);
     const Vec3d u = vec_double(in.u), v = vec_double(in.v);
     const double box = length(cross(u, v));
     if (!(box > std::numeric_limits<float>::min()))
@@ -304,6 +317,7 @@ Camera to_camera(const lumicut_camera& in) {
   const Checked c("lumicut_camera");
   c.integer("orthographic", in.orthographic, 0, 1);
   for (int k = 0; k < 12; ++k) c.finite("to_world", in.to_world[k], k);
+  for (const int k : {3, 7, 11}) c.coordinate("to_world", in.to_world[k], k);
   const auto column = [&](int k) { return Vec3d{in.to_world[k], in.to_world[4 + k], in.to_world[8 + k]}; };
   const Vec3d x = column(0), y = column(1), z = column(2);
   for (int k = 0; k < 3; ++k)
@@ -321,7 +335,7 @@ Camera to_camera(const lumicut_camera& in) {
   camera.forward = single(-back), camera.right = single(right), camera.up = single(up);
   camera.position = single(column(3));
   if (camera.orthographic) {
-    c.range("height", in.height, std::numeric_limits<float>::min(), kInf);
+    c.range("height", in.height, std::numeric_limits<float>::min(), kLargestCoordinate);
     camera.height = in.height;
   } else {
     c.range("fov_y", in.fov_y, 1e-4f, kPi - 1e-4f);
@@ -341,7 +355,7 @@ Camera to_camera(const lumicut_camera& in) {
     c.range("pixel_aspect", in.pixel_aspect, 1e-3f, 1e3f);
     camera.pixel_aspect = in.pixel_aspect;
   }
-  c.not_negative("lens_radius", in.lens_radius);
+  c.range("lens_radius", in.lens_radius, 0.0f, kLargestCoordinate);
   camera.lens_radius = in.lens_radius;
   if (in.lens_radius > 0.0f) {
     c.range("focus_distance", in.focus_distance, std::numeric_limits<float>::min(), kInf);
@@ -371,7 +385,7 @@ VplSet to_vpls(const lumicut_vpl* lights, uint64_t count) {
     vpl.group = in.group;
     vpl.intensity = vec(in.intensity);
     if (vpl.kind != VplKind::directional) {
-      c.finite("position", in.position);
+      c.coordinate("position", in.position);
       vpl.position = vec(in.position);
     }
     if (vpl.kind != VplKind::omni) {
@@ -390,7 +404,7 @@ VplSet to_vpls(const lumicut_vpl* lights, uint64_t count) {
       vpl.cos_outer = in.cos_outer, vpl.profile = in.profile;
       vpl.blend_cosine = in.blend, vpl.spot_cosine = in.spot_cosine, vpl.spread_tan = in.spread_tan;
     } else if (vpl.kind == VplKind::sphere) {
-      c.range("cos_outer", in.cos_outer, std::numeric_limits<float>::min(), std::numeric_limits<float>::max());
+      c.range("cos_outer", in.cos_outer, std::numeric_limits<float>::min(), kLargestCoordinate);
       vpl.cos_outer = in.cos_outer;
     } else if (vpl.kind == VplKind::spot) {
       c.range("cos_outer", in.cos_outer, -1.0f, 1.0f);
@@ -419,7 +433,7 @@ void check_points(const Scene& scene, const lumicut_point* points, uint64_t coun
     for (size_t i = begin; i < end; ++i) {
       const Checked c("lumicut_point", i);
       const lumicut_point& p = points[i];
-      c.finite("position", p.position);
+      c.coordinate("position", p.position);
       check_unit(c, "normal", p.normal);
       check_unit(c, "geometric_normal", p.geometric_normal);
       check_unit(c, "to_viewer", p.to_viewer);

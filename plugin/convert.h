@@ -14,6 +14,9 @@
 
 namespace lumicut {
 
+// What traces rays: the fields that a scene and an accel alone have in common.
+Scene::Config to_accel(const char* owner, uint32_t robust, const char* kind, const char* builder);
+
 Texture to_texture(const lumicut_texture& in, uint64_t index);
 Material to_material(const lumicut_material& in, uint64_t index);
 Mesh to_mesh(const lumicut_mesh& in);

@@ -35,7 +35,7 @@ LUMICUT_DESCRIPTOR(lumicut_accel_desc, F(struct_size), F(robust), F(kind), F(bui
 LUMICUT_DESCRIPTOR(lumicut_accel_info, F(struct_size), F(node_count), F(primitive_count), F(bytes), F(build_seconds),
                    F(expected_boxes), F(expected_primitives), F(expected_cost), F(lower), F(upper));
 LUMICUT_DESCRIPTOR(lumicut_accel_node_info, F(struct_size), F(left), F(right), F(first), F(count), F(lower), F(upper));
-LUMICUT_DESCRIPTOR(lumicut_scene_desc, F(struct_size), F(robust), F(accel));
+LUMICUT_DESCRIPTOR(lumicut_scene_desc, F(struct_size), F(robust), F(accel), F(builder));
 LUMICUT_DESCRIPTOR(lumicut_texture, F(struct_size), F(width), F(height), F(channels), F(format), F(flags), F(pixels));
 LUMICUT_DESCRIPTOR(lumicut_material, F(struct_size), F(flags), F(diffuse), F(shininess), F(specular), F(opacity),
                    F(emission), F(diffuse_texture), F(specular_texture), F(opacity_texture), F(emission_texture),

@@ -1,5 +1,8 @@
 #include "scene/scene.h"
 
+#include <cstdio>
+
+#include "accel/validate.h"
 #include "core/error.h"
 #include "core/rng.h"
 
@@ -8,6 +11,12 @@ namespace lumicut {
 namespace {
 
 constexpr float kInvPi = 0.31830988618f;
+
+std::string short_text(float v) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%g", static_cast<double>(v));
+  return text;
+}
 
 std::string at(const char* what, size_t i) { return std::string(what) + "[" + std::to_string(i) + "]"; }
 
@@ -174,13 +183,23 @@ void Scene::commit(Progress& progress) {
     for (uint32_t i = 0; i < instance_count(m); ++i) {
       const Transform& t = instance(m, i);
       if (instanced) geometry.instances.push_back({m, t});
-      for (uint32_t index : mesh.indices) bounds.extend(t.point(mesh.positions[index]));
+      Aabb box;
+      for (size_t k = 0; k < mesh.indices.size(); ++k) {
+        if (k % 65536 == 0) progress.check();
+        const uint32_t index = mesh.indices[k];
+        const Vec3f p = t.point(mesh.positions[index]);
+        box.extend(p);
+        if (within(p, kLargestCoordinate)) continue;
+        fail_argument(at("mesh", m) + " vertex " + std::to_string(index) + " of " + at("instance", i) + " lies at (" +
+                      short_text(p.x) + ", " + short_text(p.y) + ", " + short_text(p.z) + "), beyond " +
+                      short_text(kLargestCoordinate));
+      }
+      bounds.extend(box);
     }
   }
-  if (!bounds.empty() && !(is_finite(bounds.lo) && is_finite(bounds.hi) && std::isfinite(bounds.diagonal2())))
-    fail_argument("the scene's bounds overflow single precision");
 
-  auto accel = trace_ ? trace_(geometry) : make_accel(config_.accel, geometry, {config_.robust, ""}, &progress);
+  auto accel =
+      trace_ ? trace_(geometry) : make_accel(config_.accel, geometry, {config_.robust, config_.builder}, &progress);
   accel_ = std::move(accel);
   first_instance_ = std::move(first_instance);
   instanced_ = instanced;

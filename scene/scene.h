@@ -50,9 +50,10 @@ struct SurfaceHit {
 class Scene final : private HitFilter {
  public:
   struct Config {
-    std::string accel = "embree";
+    std::string accel = kDefaultAccel;
     bool robust = true;
-    LUMICUT_FIELDS(Config, accel, robust)
+    std::string builder = "";  // of "bvh"
+    LUMICUT_FIELDS(Config, accel, robust, builder)
   };
   // Makes the host's own tracer over this scene's geometry (accel/host_accel.h).
   using AccelFactory = std::function<std::unique_ptr<Accel>(const AccelGeometry&)>;

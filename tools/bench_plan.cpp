@@ -51,7 +51,7 @@ class PlanReader {
     plan_.keep_images = top.boolean("keep_images", true);
     plan_.yardstick = top.boolean("yardstick", false);
     if (const auto accel = top.find("accel")) {
-      static const std::vector<std::string> kKinds = {"embree", "agglomerative"};
+      static const std::vector<std::string> kKinds = {"bvh", "embree", "agglomerative"};
       plan_.accel = kKinds[accel->choice(kKinds)];
     }
     if (const auto rays = top.find("rays")) {

@@ -45,7 +45,7 @@ struct BenchScene {
 };
 
 struct BenchPlan {
-  std::string file, name, description, accel = "embree", rays = "robust", baseline;
+  std::string file, name, description, accel = "bvh", rays = "robust", baseline;
   int threads = 0, repeat = 1, amortise_views = 10;
   bool keep_images = true, yardstick = false;
   bool strict = false;  // of the command alone: warnings of scenes are errors

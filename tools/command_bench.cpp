@@ -608,7 +608,7 @@ void add_bench(CLI::App& app) {
       ->check(CLI::Range(1, 1000));
   command->add_option("--threads", o->threads, "Threads, in place of the plan's; 0: all")->check(CLI::Range(0, 4096));
   command->add_option("--accel", o->accel, "How rays are traced, in place of the plan's")
-      ->check(CLI::IsMember({"embree", "agglomerative"}));
+      ->check(CLI::IsMember({"bvh", "embree", "agglomerative"}));
   auto* resume = command->add_flag("--resume", o->resume, "Go on with what stands in the folder");
   command->add_flag("--overwrite", o->overwrite, "Begin anew, though results stand in the folder")->excludes(resume);
   command->add_flag("--check", o->check, "Read the plan and say whether it is good; run nothing");

@@ -443,6 +443,7 @@ class RenderCommand {
     stats["triangles"] = triangles_;
     stats["width"] = desc_.width, stats["height"] = desc_.height, stats["samples"] = desc_.samples;
     stats["accel"] = o_.accel;
+    if (!o_.builder.empty()) stats["builder"] = o_.builder;
     stats["robust"] = o_.rays == "robust";
     stats["threads"] = o_.threads;
     ordered_json parameters = ordered_json::object();

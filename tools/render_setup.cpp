@@ -20,7 +20,9 @@ void add_setup_options(CLI::App& command, RenderSetup& setup) {
   command.add_option("--vpls", setup.vpls, "Number of virtual lights; as -p vpls=N");
   command.add_option("--seed", setup.seed, "Seed of all randomness; as -p seed=N");
   command.add_option("--threads", setup.threads, "Threads; 0: all")->capture_default_str()->check(CLI::Range(0, 4096));
-  command.add_option("--accel", setup.accel, "How rays are traced: embree or agglomerative")->capture_default_str();
+  command.add_option("--accel", setup.accel, "What traces rays: bvh, the library's own, or embree")
+      ->capture_default_str();
+  command.add_option("--builder", setup.builder, "How bvh builds its tree; docs/embree_dropin.md lists them");
   command.add_option("--rays", setup.rays, "robust: none slips between two triangles; fast: some may, in less time")
       ->check(CLI::IsMember({"robust", "fast"}))
       ->capture_default_str();
@@ -53,7 +55,8 @@ void create_scene(const io::Api& api, const RenderSetup& setup, lumicut_device d
   lumicut_scene_desc desc{};
   desc.struct_size = sizeof(desc);
   desc.accel = setup.accel.c_str();
-  desc.robust = setup.rays == "robust" ? 1 : 0;
+  desc.robust = setup.rays == "robust" ? LUMICUT_ROBUST : LUMICUT_FAST;
+  desc.builder = setup.builder.empty() ? nullptr : setup.builder.c_str();
   if (api.scene_create(device, &desc, scene.out()) != LUMICUT_OK) throw UsageError(api.last_error());
 }
 

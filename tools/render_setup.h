@@ -18,14 +18,14 @@ namespace lumicut::tools {
 class InterruptWatcher;
 
 struct RenderSetup {
-  std::string integrator, accel = "embree", rays = "robust";
+  std::string integrator, accel = "bvh", builder, rays = "robust";
   std::vector<std::string> parameters;  // name=value
   std::optional<uint64_t> vpls, seed;
   int threads = 0;
   bool strict = false;
 };
 
-// -i, -p, --vpls, --seed, --threads, --accel, --rays, --strict.
+// -i, -p, --vpls, --seed, --threads, --accel, --builder, --rays, --strict.
 void add_setup_options(CLI::App& command, RenderSetup& setup);
 
 // Prints on standard error what was noticed while the scene of that file was read; throws FileError when `strict` and

@@ -23,7 +23,7 @@ LampSurfaces::LampSurfaces(const Scene& scene) : scene_(scene) {
   geometry.filter = this;
   geometry.meshes.push_back(
       {positions_.data(), positions_.size(), indices_.data(), indices_.size() / 3, 0xffffffffu, disks});
-  accel_ = make_accel("agglomerative", geometry, {true, ""});
+  accel_ = make_accel(kDefaultAccel, geometry, {true, ""});
 }
 
 float LampSurfaces::area(const Light& light) {

@@ -233,9 +233,9 @@ std::string machine() {
   return "unknown";
 }
 
-const std::vector<std::string> kBuilders = {"sweep",          "agglomerative", "agglomerative+reinsert",
-                                            "parallel",       "buckets",       "buckets+reinsert:5x3",
-                                            "sweep+reinsert", "binned",        "binned-longest"};
+const std::vector<std::string> kBuilders = {
+    kDefaultBuilder,        "sweep",          "agglomerative", "agglomerative+reinsert", "agglomerative-parallel",
+    "binned-agglomerative", "sweep+reinsert", "binned",        "binned-longest"};
 
 void bench_build(const std::vector<BenchMesh>& meshes, const std::vector<std::string>& real,
                  const std::vector<std::string>& builders, int rounds) {
@@ -291,8 +291,9 @@ void bench_build(const std::vector<BenchMesh>& meshes, const std::vector<std::st
 
 void bench_parallel(const std::vector<BenchMesh>& meshes, int rounds) {
   std::printf(
-      "\n## Two threads\n\nWall seconds, least of %d.\n\n| mesh | exact, 1 thread | parallel (same tree), 1 thread | 2 "
-      "threads | exact / parallel on 2 | buckets, 1 thread | 2 threads | speedup "
+      "\n## Two threads\n\nWall seconds, least of %d.\n\n| mesh | exact, 1 thread | agglomerative-parallel, 1 thread | "
+      "2 "
+      "threads | exact / parallel on 2 | binned-agglomerative, 1 thread | 2 threads | speedup "
       "|\n|---|---|---|---|---|---|---|---|\n",
       rounds);
   for (const BenchMesh& mesh : meshes) {
@@ -305,8 +306,9 @@ void bench_parallel(const std::vector<BenchMesh>& meshes, int rounds) {
             std::min(best, timed_wall([&] { arena.execute([&] { build_tree(boxes, build_options_of(builder)); }); }));
       return best;
     };
-    const double exact = least("agglomerative", 1), p1 = least("parallel", 1), p2 = least("parallel", 2),
-                 b1 = least("buckets", 1), b2 = least("buckets", 2);
+    const double exact = least("agglomerative", 1), p1 = least("agglomerative-parallel", 1),
+                 p2 = least("agglomerative-parallel", 2), b1 = least("binned-agglomerative", 1),
+                 b2 = least("binned-agglomerative", 2);
     std::printf("| %s | %.3f | %.3f | %.3f | %.2fx | %.3f | %.3f | %.2fx |\n", mesh.name.c_str(), exact, p1, p2,
                 exact / p2, b1, b2, b1 / b2);
     std::fflush(stdout);
@@ -495,7 +497,7 @@ void bench_scaling(size_t most, uint64_t seed) {
 int main(int argc, char** argv) {
   CLI::App app("Our BVH beside Embree");
   std::vector<std::string> names, sections{"build", "parallel", "rays", "features", "scaling"};
-  std::string builder = "agglomerative+reinsert";
+  std::string builder = kDefaultBuilder;
   std::vector<std::string> builders = kBuilders;
   size_t rays = 200000, most = 1000000;
   int rounds = 5;

@@ -148,7 +148,7 @@ class LumicutEngine(bpy.types.RenderEngine):
 
         device = runtime.device(settings.threads)
         watched = Watched(self)
-        with library.Scene(device, settings.accel) as target, library.Integrator(device, integrator_name) as integrator:
+        with library.Scene(device, **properties.tracing_of(settings)) as target, library.Integrator(device, integrator_name) as integrator:
             data.upload(target, self._check)
             triangles, instances = data.triangles(), sum(len(m.transforms) for m in data.meshes)
             lamps, meshes, groups = len(data.lights), len(data.meshes), data.groups

@@ -286,6 +286,11 @@ class Writer:
 def command_of(path, settings):
     """The command that renders the exported scene as F12 does."""
     words = ["lumicut", "render", str(path), "-i", settings.integrator, "--accel", settings.accel]
+    tracing = properties.tracing_of(settings)
+    if tracing["builder"]:
+        words += ["--builder", tracing["builder"]]
+    if not tracing["robust"]:
+        words += ["--rays", "fast"]
     if settings.passes > 1:
         words += ["--passes", str(settings.passes)]
     for name, option, default in (("max_seconds", "--seconds", 0), ("target_error", "--target-error", 0),

@@ -14,11 +14,12 @@ from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int32, c_u
 
 import numpy as np
 
-ABI_MAJOR, ABI_MINOR = 1, 2
+ABI_MAJOR, ABI_MINOR = 1, 3
 OK, INVALID_ARGUMENT, INVALID_STATE, UNSUPPORTED, OUT_OF_MEMORY, CANCELLED, INTERNAL = range(7)
 IDLE, RUNNING, DONE, STOPPED, FAILED = range(5)
 FLOAT, INT, BOOL, CHOICE = range(4)
 UINT8, FLOAT32 = 0, 1
+ROBUST, FAST = 1, 2  # of SceneDesc.robust
 SRGB, CLAMP, NEAREST = 1, 2, 4
 EMIT_BOTH_SIDES, PHONG, GGX, NO_FRESNEL = 1, 2, 4, 8
 POINT, SPOT, RECTANGLE, DISK, SUN = range(5)
@@ -67,7 +68,7 @@ class Status(Descriptor):
 
 
 class SceneDesc(Descriptor):
-    _fields_ = [("struct_size", c_uint32), ("robust", c_uint32), ("accel", c_char_p)]
+    _fields_ = [("struct_size", c_uint32), ("robust", c_uint32), ("accel", c_char_p), ("builder", c_char_p)]
 
 
 class Texture(Descriptor):
@@ -145,7 +146,7 @@ class ChannelInfo(Descriptor):
 
 
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
-SIZES = {DeviceDesc: 32, Status: 64, SceneDesc: 16, Texture: 32, Material: 124, Mesh: 88, Light: 116, Profile: 40,
+SIZES = {DeviceDesc: 32, Status: 64, SceneDesc: 24, Texture: 32, Material: 124, Mesh: 88, Light: 116, Profile: 40,
          Environment: 64, Camera: 92, IntegratorInfo: 40, ParamInfo: 72, RenderDesc: 72, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32
@@ -334,10 +335,11 @@ def _rows(a, dtype, width):
 
 
 class Scene(Handle):
-    def __init__(self, device, accel="agglomerative"):
+    def __init__(self, device, accel="bvh", builder=None, robust=True):
         super().__init__(device.library)
         self.device = device
-        self._create("scene_create", device.pointer, ctypes.byref(SceneDesc(robust=1, accel=accel.encode())))
+        self._create("scene_create", device.pointer, ctypes.byref(SceneDesc(
+            robust=ROBUST if robust else FAST, accel=accel.encode(), builder=builder.encode() if builder else None)))
 
     def set_textures(self, textures):
         """(pixels, flags) each: pixels (h, w, channels) of uint8 or float32, top row first."""

@@ -161,8 +161,12 @@ class LUMICUT_PT_performance(Panel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.prop(context.scene.lumicut, "accel")
-        layout.prop(context.scene.lumicut, "threads")
+        settings = context.scene.lumicut
+        layout.prop(settings, "accel")
+        if settings.accel == "bvh":
+            layout.prop(settings, "builder")
+        layout.prop(settings, "robust")
+        layout.prop(settings, "threads")
         if runtime.loaded() is not None:
             wrapped(layout, f"Lumicut {runtime.loaded().version}, {runtime.loaded().origin}")
         layout.operator("lumicut.reload_library", icon="FILE_REFRESH")

@@ -79,7 +79,8 @@ class Session:
         for values in parameters.values():
             if "vpls" in values:
                 values["vpls"] = str(settings.viewport_lights)
-        return {"integrator": chosen, "parameters": parameters, "accel": settings.accel, "threads": settings.threads}
+        return {"integrator": chosen, "parameters": parameters, "tracing": properties.tracing_of(settings),
+                "threads": settings.threads}
 
     def draw(self, engine, context, depsgraph):
         region = context.region
@@ -172,7 +173,7 @@ class Session:
                 device = runtime.device(settings["threads"])
                 if pending is not None:
                     self.message = "building"
-                    fresh = library.Scene(device, settings["accel"])
+                    fresh = library.Scene(device, **settings["tracing"])
                     pending.camera = camera
                     pending.upload(fresh, self._raise_if_cancelled)
                     self._guarded(fresh, fresh.commit)

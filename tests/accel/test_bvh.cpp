@@ -21,8 +21,15 @@ using test::Mesh;
 using test::ray_of;
 constexpr float kInf = std::numeric_limits<float>::infinity();
 constexpr const char* kBuilders[] = {
-    "agglomerative",       "parallel", "buckets", "binned", "binned-longest", "sweep", "buckets+reinsert",
-    "sweep+reinsert:50x4", ""};
+    "agglomerative", "agglomerative-parallel",        "binned-agglomerative", "binned", "binned-longest",
+    "sweep",         "binned-agglomerative+reinsert", "sweep+reinsert:50x4",  ""};
+
+TEST(AgglomerativeBvh, EarlierNamesStillWork) {
+  EXPECT_EQ(accel_kind_of("agglomerative"), accel_kind_of("bvh"));
+  EXPECT_EQ(build_options_of("buckets").builder, build_options_of("binned-agglomerative").builder);
+  EXPECT_EQ(build_options_of("parallel").builder, build_options_of("agglomerative-parallel").builder);
+  EXPECT_EQ(build_options_of("buckets+reinsert:5x3").reinsert_passes, build_options_of("").reinsert_passes);
+}
 
 std::vector<Aabb> boxes_of(const Mesh& mesh) {
   std::vector<Aabb> boxes(mesh.indices.size() / 3);
@@ -85,8 +92,8 @@ TEST(BvhBuild, TreesDoNotDependOnTheNumberOfThreads) {
       tbb::task_arena(i == 0 ? 1 : 4).execute([&] { trees[i] = build_tree(boxes, build_options_of(name)); });
     EXPECT_TRUE(same(trees[0], trees[1])) << name;
   }
-  EXPECT_TRUE(
-      same(build_tree(boxes, build_options_of("agglomerative")), build_tree(boxes, build_options_of("parallel"))));
+  EXPECT_TRUE(same(build_tree(boxes, build_options_of("agglomerative")),
+                   build_tree(boxes, build_options_of("agglomerative-parallel"))));
 }
 
 TEST(BvhBuild, CostIsThatOfThePaper) {
@@ -185,8 +192,7 @@ TEST(AgglomerativeBvh, HitsEqualEmbreeOnAMillionRaysAScene) {
       AccelOptions options;
       options.robust = robust;
       const AccelGeometry geometry{{mesh.view()}, {}, nullptr};
-      const auto ours = make_accel("agglomerative", geometry, options),
-                 theirs = make_accel("embree", geometry, options);
+      const auto ours = make_accel("bvh", geometry, options), theirs = make_accel("embree", geometry, options);
       // A million a scene, in both modes; fewer where each instruction set takes its turn.
       const size_t kRays = std::getenv("LUMICUT_TEST_INSTRUCTION_SET") == nullptr ? 500000 : 50000, kChunk = 5000;
       std::atomic<size_t> different{0}, hits{0}, occlusion_different{0};
@@ -240,7 +246,7 @@ TEST(AgglomerativeBvh, HitsEqualEmbreeOnAMillionRaysAScene) {
 
 TEST(AgglomerativeBvh, RobustMissesNothingOnAClosedMesh) {
   const Mesh mesh = test::sphere(50, 70);
-  const auto accel = make_accel("agglomerative", {{mesh.view()}, {}, nullptr}, {});
+  const auto accel = make_accel("bvh", {{mesh.view()}, {}, nullptr}, {});
   Rng rng(1, Stage::test);
   size_t missed = 0, passed = 0, bundles_missed = 0;
   for (int i = 0; i < 100000; ++i) {
@@ -285,7 +291,7 @@ TEST(AgglomerativeBvh, BundlesAnswerAsSingleRaysDo) {
       if (instanced) geometry.instances = {{0, {}}, {0, t}};
       AccelOptions options;
       options.robust = robust;
-      const auto accel = make_accel("agglomerative", geometry, options);
+      const auto accel = make_accel("bvh", geometry, options);
       Rng rng(3, Stage::test);
       size_t different = 0, blocked = 0;
       for (int i = 0; i < 600; ++i) {
@@ -318,7 +324,7 @@ TEST(AgglomerativeBvh, AMillionCoincidentTrianglesBuildAndAreHit) {
   Mesh mesh;
   for (int i = 0; i < 3; ++i) mesh.positions.push_back({i == 1 ? 1.0f : 0.0f, i == 2 ? 1.0f : 0.0f, 1.0f});
   for (int i = 0; i < 1000000; ++i) mesh.indices.insert(mesh.indices.end(), {0, 1, 2});
-  const auto accel = make_accel("agglomerative", {{mesh.view()}, {}, nullptr}, {});
+  const auto accel = make_accel("bvh", {{mesh.view()}, {}, nullptr}, {});
   RayHit r = ray_of({0.2f, 0.2f, 0}, {0, 0, 1});
   accel->intersect({&r, 1});
   EXPECT_EQ(r.hit.geom, 0u);
@@ -339,7 +345,7 @@ TEST(AgglomerativeBvh, DeepTreesAreTraversed) {
   for (const char* builder : {"agglomerative", ""}) {
     AccelOptions options;
     options.builder = builder;
-    const auto accel = make_accel("agglomerative", {{mesh.view()}, {}, nullptr}, options);
+    const auto accel = make_accel("bvh", {{mesh.view()}, {}, nullptr}, options);
     for (size_t i = 0; i < sizes.size(); ++i) {
       RayHit r = ray_of({0, 0, sizes[i] * 0.75f}, {0, 0, 1});
       accel->intersect({&r, 1});
@@ -451,7 +457,7 @@ TEST(AgglomerativeBvh, ManyInstancesAgreeWithEmbree) {
       for (int k = 0; k < 4; ++k) instance.to_world.m[4 * row + k] = k < 3 ? rows[row][k] : 20 * rng.next_float();
     geometry.instances.push_back(instance);
   }
-  const auto ours = make_accel("agglomerative", geometry, {}), theirs = make_accel("embree", geometry, {});
+  const auto ours = make_accel("bvh", geometry, {}), theirs = make_accel("embree", geometry, {});
   size_t different = 0, hits = 0;
   for (int i = 0; i < 50000; ++i) {
     RayHit r = ray_of(test::random_point(rng) * 20.0f, test::random_direction(rng));

@@ -129,7 +129,7 @@ class Tables(unittest.TestCase):
         h.add_sphere(0.5, (0, 0, 0.5))
         h.add_light("POINT", energy=100, shadow_soft_size=0)
         images = []
-        for accel in ("agglomerative", "embree"):
+        for accel in ("bvh", "embree"):
             bpy.context.scene.lumicut.accel = accel
             with h.quiet():
                 h.set_lumicut(vpls=300)

@@ -162,7 +162,7 @@ TEST(WspdTree, CubemapCellsAreWhereTheirDirectionsPoint) {
 
 TEST(WspdTree, LocalVisibilitySeesTheWallInsideACluster) {
   // A wide wall in the plane x = 0, and lights that do not care where they shine on both sides of it.
-  auto scene = std::make_unique<Scene>(Scene::Config{"embree", true});
+  auto scene = std::make_unique<Scene>(Scene::Config{});
   scene->set_materials({test::diffuse(0.5f, 0.5f, 0.5f)});
   Mesh mesh;
   test::add_box(mesh, {-1e-3f, -5, -5}, {1e-3f, 5, 5}, 0, false);

@@ -17,7 +17,7 @@ INSTANTIATE_TEST_SUITE_P(Registry, EveryIntegrator, testing::ValuesIn([] {
                          [](const auto& entry) { return std::string(entry.param); });
 
 TEST_P(EveryIntegrator, GivesTheSameImageOnEmbreeAndOnOurBvh) {
-  const auto embree = test::make_room(1.0f, "embree"), ours = test::make_room(1.0f, "agglomerative");
+  const auto embree = test::make_room(1.0f, "embree"), ours = test::make_room(1.0f, "bvh");
   const VplSet vpls = test::lights_of(*embree, 1500);
   const auto a = test::render(*embree, GetParam(), vpls, {}), b = test::render(*ours, GetParam(), vpls, {});
   // Rays through an edge between two surfaces may take either: a few pixels in a thousand see another wall. Points that

@@ -18,7 +18,7 @@ Camera inside_looking_along_y() {
 
 // A closed box that emits and reflects evenly: radiance is emission / (1 − albedo) everywhere.
 std::unique_ptr<Scene> furnace(float albedo, float emission) {
-  auto scene = std::make_unique<Scene>(Scene::Config{"embree", true});
+  auto scene = std::make_unique<Scene>(Scene::Config{});
   Material m = test::diffuse(albedo, albedo, albedo);
   m.emission = {emission, emission, emission};
   scene->set_materials({m});
@@ -54,7 +54,7 @@ TEST(PathTracer, RadianceInAFurnaceIsTheGeometricSum) {
 }
 
 TEST(PathTracer, DirectLightOfADiskIsTheClosedForm) {
-  auto scene = std::make_unique<Scene>(Scene::Config{"embree", true});
+  auto scene = std::make_unique<Scene>(Scene::Config{});
   scene->set_materials({test::diffuse(0.5f, 0.5f, 0.5f)});
   Mesh mesh;
   test::add_quad(mesh, {-9, -9, 0}, {9, -9, 0}, {9, 9, 0}, {-9, 9, 0}, 0);
@@ -81,7 +81,7 @@ TEST(PathTracer, DirectLightOfADiskIsTheClosedForm) {
 // Emission seen by rays alone, by light samples alone and by both must agree.
 TEST(PathTracer, AnEmissiveMeshGivesWhatARectangleLampGives) {
   const auto image = [](bool mesh_light) {
-    auto scene = std::make_unique<Scene>(Scene::Config{"embree", true});
+    auto scene = std::make_unique<Scene>(Scene::Config{});
     Material glossy = test::diffuse(0.3f, 0.3f, 0.3f), lamp = test::diffuse(0, 0, 0);
     glossy.specular = {0.5f, 0.5f, 0.5f};
     glossy.shininess = 200.0f;
@@ -117,7 +117,7 @@ TEST(PathTracer, AnEmissiveMeshGivesWhatARectangleLampGives) {
 
 // A mirror on one wall, a rough metal block under a rough clear coat, a glass block: light by way of all of them.
 std::unique_ptr<Scene> shiny_room() {
-  auto scene = std::make_unique<Scene>(Scene::Config{"embree", true});
+  auto scene = std::make_unique<Scene>(Scene::Config{});
   Material mirror, metal, glass;
   mirror.lobe = metal.lobe = glass.lobe = LobeModel::ggx;
   mirror.diffuse = {0.9f, 0.9f, 0.9f}, mirror.metallic = 1.0f, mirror.roughness = 0.0f;

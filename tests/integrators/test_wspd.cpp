@@ -111,7 +111,7 @@ TEST(Wspd, ErrorFallsWithTheSeparation) {
 
 TEST(Wspd, SkiesAndSunsAreClusteredByDirection) {
   // A floor and a block under the open sky.
-  auto scene = std::make_unique<Scene>(Scene::Config{"embree", true});
+  auto scene = std::make_unique<Scene>(Scene::Config{});
   scene->set_materials({test::diffuse(0.7f, 0.7f, 0.7f)});
   Mesh mesh;
   test::add_quad(mesh, {-2, -2, 0}, {2, -2, 0}, {2, 2, 0}, {-2, 2, 0}, 0);

@@ -40,7 +40,7 @@ std::vector<lumicut_rayhit> random_rays(size_t n) {
 }
 
 class AccelKinds : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Accel, AccelKinds, testing::Values("embree", "agglomerative"),
+INSTANTIATE_TEST_SUITE_P(Accel, AccelKinds, testing::Values("embree", "bvh"),
                          [](const auto& each) { return std::string(each.param); });
 
 TEST_P(AccelKinds, HitsAreThoseOfTryingEveryTriangle) {

@@ -159,13 +159,14 @@ TEST(Abi, DescriptorsOfAnySizeAreReadByTheGrowthRule) {
   {
     using T = lumicut_scene_desc;
     auto d = make<T>();
-    d.robust = 1, d.accel = "embree";
-    check_input("lumicut_scene_desc", bytes_of(d), {F(T, struct_size), F(T, robust), F(T, accel)}, [&](const void* p) {
-      lumicut_scene made = nullptr;
-      const auto code = lumicut_scene_create(device.get(), static_cast<const T*>(p), &made);
-      lumicut_release(made);
-      return code;
-    });
+    d.robust = 1, d.accel = "bvh", d.builder = "sweep";
+    check_input("lumicut_scene_desc", bytes_of(d), {F(T, struct_size), F(T, robust), F(T, accel), F(T, builder)},
+                [&](const void* p) {
+                  lumicut_scene made = nullptr;
+                  const auto code = lumicut_scene_create(device.get(), static_cast<const T*>(p), &made);
+                  lumicut_release(made);
+                  return code;
+                });
   }
   {
     using T = lumicut_texture;

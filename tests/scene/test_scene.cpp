@@ -106,7 +106,7 @@ TEST(Scene, CutOutsLetRaysThrough) {
 }
 
 TEST(Scene, WhatIsPartlyTransparentStopsItsShareOfTheRays) {
-  for (const char* kind : {"embree", "agglomerative"}) {
+  for (const char* kind : {"embree", "bvh"}) {
     Scene scene{{.accel = kind}};
     Material m;
     m.opacity = 0.3f;

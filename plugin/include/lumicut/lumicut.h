@@ -35,7 +35,7 @@ extern "C" {
 #endif
 
 #define LUMICUT_ABI_MAJOR 1
-#define LUMICUT_ABI_MINOR 2
+#define LUMICUT_ABI_MINOR 3
 #define LUMICUT_FOREVER 0xffffffffu /* milliseconds */
 
 typedef int32_t lumicut_result;
@@ -107,9 +107,9 @@ typedef struct lumicut_rayhit {
 
 typedef struct lumicut_accel_desc {
   uint32_t struct_size;
-  uint32_t robust;         /* 1: watertight on shared edges */
-  const char* kind;        /* "agglomerative" (default) or "embree" */
-  const char* builder;     /* agglomerative alone: see docs/embree_dropin.md; NULL: the default */
+  uint32_t robust;         /* LUMICUT_ROBUST (default, also 0) or LUMICUT_FAST */
+  const char* kind;        /* "bvh" (default), the library's own ("agglomerative" is its name of before 1.3), or "embree" */
+  const char* builder;     /* "bvh" alone: see docs/embree_dropin.md; NULL: the default */
   const float* positions;  /* xyz */
   uint64_t position_count;
   uint64_t position_stride; /* bytes; 0: 12 */
@@ -118,6 +118,7 @@ typedef struct lumicut_accel_desc {
   const float* boxes;      /* instead of triangles: six floats a box, lower and upper corner; rays hit the boxes themselves */
   uint64_t box_count;
 } lumicut_accel_desc;
+enum { LUMICUT_ROBUST = 1, LUMICUT_FAST = 2 }; /* watertight on shared edges; a little faster: some rays slip through them */
 
 typedef struct lumicut_accel_info {
   uint32_t struct_size;
@@ -146,8 +147,9 @@ LUMICUT_API lumicut_result lumicut_accel_occluded(lumicut_accel accel, lumicut_r
 
 typedef struct lumicut_scene_desc {
   uint32_t struct_size;
-  uint32_t robust;   /* 1: watertight tracing */
-  const char* accel; /* "embree" (default), "agglomerative"; the host's own with lumicut_scene_set_trace */
+  uint32_t robust;     /* as in lumicut_accel_desc: watertight unless LUMICUT_FAST */
+  const char* accel;   /* as `kind` there; the host's own with lumicut_scene_set_trace */
+  const char* builder; /* as there */
 } lumicut_scene_desc;
 
 typedef struct lumicut_texture {

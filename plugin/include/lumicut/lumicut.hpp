@@ -116,8 +116,8 @@ class Accel : public Handle<lumicut_accel> {
 
 class Scene : public Handle<lumicut_scene> {
  public:
-  explicit Scene(const Device& device, const char* accel = nullptr, bool robust = true)
-      : Handle(create(device, accel, robust)) {}
+  explicit Scene(const Device& device, const char* accel = nullptr, bool robust = true, const char* builder = nullptr)
+      : Handle(create(device, accel, robust, builder)) {}
 
   void set_textures(const std::vector<lumicut_texture>& t) {
     check(lumicut_scene_set_textures(get(), t.data(), t.size()));
@@ -145,10 +145,11 @@ class Scene : public Handle<lumicut_scene> {
   void commit() { check(lumicut_scene_commit(get())); }
 
  private:
-  static lumicut_scene create(const Device& device, const char* accel, bool robust) {
+  static lumicut_scene create(const Device& device, const char* accel, bool robust, const char* builder) {
     auto desc = make<lumicut_scene_desc>();
-    desc.robust = robust ? 1 : 0;
+    desc.robust = robust ? LUMICUT_ROBUST : LUMICUT_FAST;
     desc.accel = accel;
+    desc.builder = builder;
     lumicut_scene scene = nullptr;
     check(lumicut_scene_create(device.get(), &desc, &scene));
     return scene;
