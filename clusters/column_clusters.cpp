@@ -309,7 +309,7 @@ void ColumnClusters::split(size_t count, const Progress& progress) {
     const Cluster c = clusters_[index];
     if (!(c.cost > 1e-12 * total)) break;
     if (c.end - c.begin < 2) continue;
-    if (clusters_.size() % 16 == 0) progress.check();
+    progress.check();
     const uint32_t mid = split_place(c.begin, c.end, sums_[index]);
     sums_[index] = sums(c.begin, mid);
     clusters_[index] = {c.begin, mid, sums_[index].weight, cost(sums_[index])};

@@ -257,8 +257,12 @@ void GrowCuts(const LightTree& tree, const Accel& accel, const CutOptions& o, si
   }
   for (const uint32_t root : tree.roots()) AddNode(tree, accel, o, root, all, nullptr, cuts);
   std::vector<uint32_t>& resting = cuts.resting;
+  // Each node of the tree comes here at most twice: from the heap, and from among those that rest.
+  uint32_t steps = 0;
+  const auto cancelled = [&] { return ++steps % 64 == 0 && o.progress != nullptr && o.progress->cancelled(); };
   for (;;) {
     while (!cuts.heap.empty()) {
+      if (cancelled()) return cuts.drop();
       std::pop_heap(cuts.heap.begin(), cuts.heap.end());
       const uint32_t index = cuts.heap.back().entry;
       cuts.heap.pop_back();
@@ -266,6 +270,7 @@ void GrowCuts(const LightTree& tree, const Accel& accel, const CutOptions& o, si
       Refine(tree, accel, o, index, cuts);
     }
     if (resting.empty()) break;
+    if (cancelled()) return cuts.drop();
     // Those that were within the share when they came: radiance may have fallen since.
     const uint32_t index = resting.back();
     resting.pop_back();

@@ -7,6 +7,7 @@
 #include "accel/accel.h"
 #include "clusters/bounds.h"
 #include "clusters/light_tree.h"
+#include "core/progress.h"
 
 namespace lumicut {
 
@@ -17,7 +18,8 @@ struct CutOptions {
   float clamp2 = 0.0f;  // as in light_points
   float error = 0.02f;  // largest share of a point's luminance that a cluster's bound may reach
   uint32_t max_cut = 0xffffffffu;
-  uint32_t slot = 0;  // of LightTree::representative
+  uint32_t slot = 0;                   // of LightTree::representative
+  const Progress* progress = nullptr;  // where it is cancelled, the cuts are left as they are
 };
 
 // A cluster in the cuts of the points in `active`.
@@ -57,6 +59,7 @@ struct LightCuts {
   CutEntry& entry(uint32_t i) { return chunks_[i / kChunk][i % kChunk]; }
   uint32_t allocate();
   void release(uint32_t i) { free_.push_back(i); }
+  void drop() { heap.clear(), resting.clear(); }
 
  private:
   static constexpr size_t kChunk = 64;  // entries stay where they are

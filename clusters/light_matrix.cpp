@@ -40,7 +40,8 @@ struct Tile {
                 float shadowed_share, const Progress& progress) {
     uint64_t rays = 0;
     values.assign(rows.size() * kTile, 0.0f);
-    for (size_t l = 0; l < count; ++l)
+    for (size_t l = 0; l < count; ++l) {
+      if (l % 16 == 0 && progress.cancelled()) return rays;
       for (size_t first = 0; first < rows.size(); first += kMaxLit) {
         light_points(lights[l], lights[l].intensity, clamp2, rows, first, std::min(kMaxLit, rows.size() - first), lit);
         if (lights[l].kind == VplKind::directional) {
@@ -53,6 +54,7 @@ struct Tile {
           values[(first + lit.index[i]) * kTile + l] =
               luminance({lit.r[i], lit.g[i], lit.b[i]}) * (lit.occluded[i] ? shadowed_share : 1.0f);
       }
+    }
     for (size_t r = 0; r < rows.size(); ++r) {
       if (r % 16 == 0 && progress.cancelled()) return rays;
       float* row = values.data() + r * kTile;

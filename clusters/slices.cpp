@@ -56,7 +56,7 @@ PointFeature point_feature(const ShadePoints& points, size_t i, float length) {
   return {{at.x, at.y, at.z, n.x, n.y, n.z, m.x, m.y, m.z}};
 }
 
-Slices build_slices(const ShadePoints& points, size_t count, size_t least, float length) {
+Slices build_slices(const ShadePoints& points, size_t count, size_t least, float length, const Progress* progress) {
   Slices slices;
   const auto n = static_cast<uint32_t>(points.size());
   if (n == 0) return slices;
@@ -75,6 +75,7 @@ Slices build_slices(const ShadePoints& points, size_t count, size_t least, float
     const int index = queue.top();
     queue.pop();
     const Group g = groups[index];
+    if (progress != nullptr) progress->check();
     if (g.end - g.begin < 2 * least) continue;
     const auto first = slices.order.begin() + g.begin, last = slices.order.begin() + g.end;
     const float cut = g.mean.v[g.axis];

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "core/progress.h"
 #include "scene/shade_points.h"
 
 namespace lumicut {
@@ -27,6 +28,7 @@ inline float distance2(const PointFeature& a, const PointFeature& b) {
 
 // Halves the group with the largest sum of squared distances from its mean, across the axis of largest variance, until
 // there are `count` groups or none has more than `least` points. Slices that follow each other are mostly near.
-Slices build_slices(const ShadePoints& points, size_t count, size_t least, float length);
+Slices build_slices(const ShadePoints& points, size_t count, size_t least, float length,
+                    const Progress* progress = nullptr);
 
 }  // namespace lumicut

@@ -164,8 +164,8 @@ uint32_t WspdTree::add_octree(const std::vector<Vpl>& lights, std::vector<uint32
 
 void WspdTree::find_balls(Progress& progress) {
   parallel_chunks(nodes_.size(), 256, [&](size_t begin, size_t end) {
-    if (progress.cancelled()) return;
     for (size_t n = begin; n < end; ++n) {
+      if (progress.cancelled()) return;
       WspdNode& node = nodes_[n];
       Aabb box;
       double power = 0;
@@ -271,6 +271,7 @@ void WspdTree::find_groups(const Options& options, Progress& progress) {
     std::vector<float> distance;
     std::vector<uint8_t> group_of;
     for (size_t n = begin; n < end; ++n) {
+      if (progress.cancelled()) return;
       WspdNode& node = nodes_[n];
       if (used[n] == 0) continue;
       const std::span<const Vpl> lights(lights_.data() + node.first, node.last - node.first);

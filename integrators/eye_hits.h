@@ -2,11 +2,23 @@
 #pragma once
 
 #include <algorithm>
+#include <span>
 #include <vector>
 
+#include "accel/accel.h"
 #include "scene/shade_points.h"
 
 namespace lumicut {
+
+// trace(part) of all the rays, part after part, between which it looks at cancel.
+template <typename T, typename Fn>
+void trace_in_parts(std::span<T> rays, const Progress& progress, const Fn& trace) {
+  constexpr size_t kPart = 16384;
+  for (size_t first = 0; first < rays.size(); first += kPart) {
+    progress.check();
+    trace(rays.subspan(first, std::min(kPart, rays.size() - first)));
+  }
+}
 
 struct EyeHits {
   std::vector<SurfacePoint> found;

@@ -42,7 +42,7 @@ void EyeRays::near_mesh(const SurfacePoint& point, Rng& rng, std::vector<Ray>& s
   hits.add(lost * mis_weight(s.density * d2 / cosine, Bsdf(point).pdf(to_light)), point.pixel, s.vpl.group);
 }
 
-EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& counters) const {
+EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, const Progress& progress, Counters& counters) const {
   EyeHits hits;
   std::vector<RayHit> rays;
   std::vector<Rgb> weights;
@@ -52,6 +52,7 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
   std::vector<Ray> shadows;
   std::vector<ChainRay> chains;
   for (size_t i = 0; i < points.size(); ++i) {
+    if (i % 4096 == 0) progress.check();
     const SurfacePoint point = points.get(i);
     Rng rng = place_rng(scene_, point, hash64(seed_, level), Stage::eye_ray);
     if (!lamps_.empty()) near_lamps(point, rng, shadows, hits);
@@ -65,13 +66,14 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
         pdfs.push_back(s.pdf);
   }
   if (!shadows.empty()) {
-    scene_.accel().occluded(shadows);
+    trace_in_parts(std::span(shadows), progress, [&](std::span<Ray> part) { scene_.accel().occluded(part); });
     for (size_t i = 0; i < shadows.size(); ++i)
       if (shadows[i].tfar < 0.0f) hits.light[i] = {};
   }
-  if (!rays.empty()) scene_.accel().intersect(rays);
+  trace_in_parts(std::span(rays), progress, [&](std::span<RayHit> part) { scene_.accel().intersect(part); });
   counters.rays += shadows.size() + rays.size();
   for (size_t i = 0; i < rays.size(); ++i) {
+    if (i % 4096 == 0) progress.check();
     if (!lamp_surfaces_.empty())
       lamp_surfaces_.for_each_hit(
           rays[i].ray.org, rays[i].ray.dir, std::min(rays[i].ray.tfar, distance_), [&](const LampSurfaces::Hit& lamp) {
@@ -110,7 +112,7 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, Counters& coun
     add(point);
     if (auto coat = scene_.coat_point(surface, to_viewer, pixels[i])) add(*coat);
   }
-  follow_chains(scene_, lamp_surfaces_, std::move(chains), hits, counters);
+  follow_chains(scene_, lamp_surfaces_, std::move(chains), progress, hits, counters);
   return hits;
 }
 

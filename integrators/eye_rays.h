@@ -21,7 +21,7 @@ class EyeRays {
 
   // One ray from each point (unless it is cut short by chance, or the point is black), one sample of each near lamp,
   // and one of all emissive meshes. `level` counts the surfaces since the camera. Deterministic: numbers belong to the places of points.
-  EyeHits trace(const ShadePoints& points, uint32_t level, Counters& counters) const;
+  EyeHits trace(const ShadePoints& points, uint32_t level, const Progress& progress, Counters& counters) const;
 
  private:
   void near_lamps(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, EyeHits& hits) const;

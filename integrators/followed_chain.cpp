@@ -19,17 +19,18 @@ std::optional<ChainRay> start_chain(const Scene& scene, const SurfaceHit& hit, c
   return ChainRay{f->origin, f->direction, weight / survive, pixel, rng};
 }
 
-void follow_chains(const Scene& scene, const LampSurfaces& lamps, std::vector<ChainRay> chains, EyeHits& hits,
-                   Counters& counters) {
+void follow_chains(const Scene& scene, const LampSurfaces& lamps, std::vector<ChainRay> chains,
+                   const Progress& progress, EyeHits& hits, Counters& counters) {
   std::vector<RayHit> rays;
   for (uint32_t depth = 0; depth < kMaxSurfaces && !chains.empty(); ++depth) {
     rays.assign(chains.size(), {});
     for (size_t i = 0; i < chains.size(); ++i)
       rays[i].ray.org = chains[i].origin, rays[i].ray.dir = chains[i].direction;
-    scene.accel().intersect(rays);
+    trace_in_parts(std::span(rays), progress, [&](std::span<RayHit> part) { scene.accel().intersect(part); });
     counters.rays += rays.size();
     std::vector<ChainRay> next;
     for (size_t i = 0; i < chains.size(); ++i) {
+      if (i % 4096 == 0) progress.check();
       const ChainRay& chain = chains[i];
       if (!lamps.empty())
         lamps.for_each_hit(chain.origin, chain.direction, rays[i].ray.tfar, [&](const LampSurfaces::Hit& lamp) {

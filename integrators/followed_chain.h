@@ -20,7 +20,7 @@ std::optional<ChainRay> start_chain(const Scene& scene, const SurfaceHit& hit, c
                                     const Rgb& throughput, uint32_t pixel, Rng rng);
 
 // Follows the rays to their ends. Lamps with an area are seen in mirrors, though not by the camera itself.
-void follow_chains(const Scene& scene, const LampSurfaces& lamps, std::vector<ChainRay> rays, EyeHits& hits,
-                   Counters& counters);
+void follow_chains(const Scene& scene, const LampSurfaces& lamps, std::vector<ChainRay> rays, const Progress& progress,
+                   EyeHits& hits, Counters& counters);
 
 }  // namespace lumicut

@@ -71,6 +71,7 @@ class Batch {
     std::vector<std::optional<SurfacePoint>> coats(scene_.coated() ? found.size() : 0);
     std::vector<std::optional<ChainRay>> chain(lamps_ != nullptr ? found.size() : 0);
     parallel_chunks(pixels_.size(), std::max<size_t>(1, 1024 / samples), [&](size_t begin, size_t end) {
+      if (context.progress.cancelled()) return;
       std::vector<RayHit> rays((end - begin) * samples);
       std::vector<float> cosines(rays.size());
       for (size_t p = begin; p < end; ++p)
@@ -86,8 +87,10 @@ class Batch {
         if (lamps_ != nullptr) chain[at] = mirrored(rays[i], p, i % samples);
       }
     });
+    context.progress.check();
     points_.reserve(found.size());
     for (size_t i = 0; i < found.size(); ++i) {
+      if (i % 65536 == 0) context.progress.check();
       if (hit[i] == 0) continue;
       points_.push(found[i]);
       if (coats.empty()) continue;
@@ -100,7 +103,7 @@ class Batch {
       if (ray) rays.push_back(*ray);
     if (rays.empty()) return;
     Counters counters;
-    follow_chains(scene_, *lamps_, std::move(rays), seen_, counters);
+    follow_chains(scene_, *lamps_, std::move(rays), context.progress, seen_, counters);
     context.stats.add(counters);
   }
 
@@ -174,7 +177,7 @@ class Batch {
     for (uint32_t level = 1; level <= kMaxLevels && points->size() > 0; ++level) {
       context.progress.check();
       Counters counters;
-      const EyeHits hits = eye_rays->trace(*points, level, counters);
+      const EyeHits hits = eye_rays->trace(*points, level, context.progress, counters);
       context.stats.add(counters);
       for (size_t i = 0; i < hits.light.size(); ++i) light[slot(hits.group[i])][hits.pixel[i]] += hits.light[i];
       found = hits.points();

@@ -88,7 +88,7 @@ class IlluminationCut final : public Integrator {
     tree_ = LightTree::build(vpls.lights, {LightTree::Method::agglomerative, 2.0f * scene.radius(), 1, seed_},
                              context.progress);
     means_.clear();
-    if (representative == "mean") find_means();
+    if (representative == "mean") find_means(context.progress);
     context.stats.set_value("light_tree_bytes", static_cast<double>(tree_.bytes() + means_.size() * sizeof(Mean)));
   }
 
@@ -157,10 +157,11 @@ class IlluminationCut final : public Integrator {
 
   // Means by luminance, and of the two children's central lights the one nearer to them: it casts the shadows of the
   // coarse image.
-  void find_means() {
+  void find_means(const Progress& progress) {
     const auto count = static_cast<uint32_t>(tree_.node_count());
     means_.resize(count);
     for (uint32_t n = count; n-- > 0;) {  // children come after their parents
+      if (n % 65536 == 0) progress.check();
       const LightNode& node = tree_.node(n);
       Mean& mean = means_[n];
       if (node.leaf()) {
@@ -256,6 +257,7 @@ class IlluminationCut final : public Integrator {
           const size_t g = region * kLanes + static_cast<size_t>(std::countr_zero(rest));
           inner.push_back({item.node, points.leaves[g].used});
           while (!inner.empty()) {
+            if (++steps % 64 == 0 && context.progress.cancelled()) return;
             const RegionItem below = inner.back();
             inner.pop_back();
             const uint32_t again = coarse_pairs(points.leaves[g], leaf_reps, g * kLanes, below, false, *lit,

@@ -74,21 +74,27 @@ class LightSlice final : public Integrator {
     Slices slices;
     {
       const PhaseTimer timer(context.stats, "slices");
-      slices = build_slices(points, slices_, kLeastPoints, scene_->radius());
+      slices = build_slices(points, slices_, kLeastPoints, scene_->radius(), &context.progress);
     }
+    // Which of its pixel's points each is.
+    std::vector<uint32_t> sample(points.size(), 0);
+    for (size_t i = 1; i < points.size(); ++i)
+      if (points.pixel[i] == points.pixel[i - 1]) sample[i] = sample[i - 1] + 1;
     SharedTimer timer(context.stats);
     parallel_chunks(slices.size(), kGroup, [&](size_t begin, size_t end) {
       if (context.progress.cancelled()) return;
       // No task of another group is begun while this one waits: memory and time stay each group's own.
-      tbb::this_task_arena::isolate([&] { shade_group(points, slices, begin, end, radiance, counts, context, timer); });
+      tbb::this_task_arena::isolate(
+          [&] { shade_group(points, slices, sample, begin, end, radiance, counts, context, timer); });
     });
     context.progress.check();
   }
 
  private:
   // Slices [begin, end), a group.
-  void shade_group(const ShadePoints& points, const Slices& slices, size_t begin, size_t end, std::span<Rgb> radiance,
-                   std::span<PointCounts> counts, ShadeContext context, SharedTimer& timer) const {
+  void shade_group(const ShadePoints& points, const Slices& slices, const std::vector<uint32_t>& sample, size_t begin,
+                   size_t end, std::span<Rgb> radiance, std::span<PointCounts> counts, ShadeContext context,
+                   SharedTimer& timer) const {
     const bool exact = columns_ >= lights_.size();
     LightMatrix matrix;
     std::vector<PointFeature> features;
@@ -133,7 +139,7 @@ class LightSlice final : public Integrator {
       }
       timer.add(SharedTimer::clustering, SharedTimer::seconds_since(start));
       start = SharedTimer::now();
-      shade_slice(points, slices, begin + local, lights, radiance, counts, context);
+      shade_slice(points, slices, sample, begin + local, lights, radiance, counts, context);
       timer.add(SharedTimer::sum, SharedTimer::seconds_since(start));
     });
     context.stats.add(total);
@@ -163,7 +169,7 @@ class LightSlice final : public Integrator {
     return 0.01f + 0.5f * std::exp(-distance2(features[own], features[other]) / unit);
   }
 
-  void shade_slice(const ShadePoints& points, const Slices& slices, size_t slice,
+  void shade_slice(const ShadePoints& points, const Slices& slices, const std::vector<uint32_t>& sample, size_t slice,
                    const std::vector<std::vector<ScaledLight>>& lights, std::span<Rgb> radiance,
                    std::span<PointCounts> counts, ShadeContext context) const {
     const auto work = std::make_unique<LitPoints>();
@@ -172,10 +178,11 @@ class LightSlice final : public Integrator {
     std::vector<uint32_t> rays(kMaxLit), ids;
     ShadePoints own;
     for (size_t slot = 0; slot < lights.size(); ++slot) {
+      if (context.progress.cancelled()) return;
       own.clear(), ids.clear();
       for (uint32_t i = slices.begins[slice]; i < slices.begins[slice + 1]; ++i) {
         const uint32_t id = slices.order[i];
-        if (lights.size() > 1 && sample_of(points, id) % lights.size() != slot) continue;
+        if (lights.size() > 1 && sample[id] % lights.size() != slot) continue;
         own.push(points.get(id));
         ids.push_back(id);
       }
@@ -193,13 +200,6 @@ class LightSlice final : public Integrator {
       total.points += ids.size();
     }
     context.stats.add(total);
-  }
-
-  // Which of its pixel's points this is.
-  static size_t sample_of(const ShadePoints& points, size_t id) {
-    size_t s = 0;
-    while (s < id && points.pixel[id - s - 1] == points.pixel[id]) ++s;
-    return s;
   }
 
   const Scene* scene_ = nullptr;

@@ -41,7 +41,7 @@ class Lightcuts final : public Integrator {
       for (size_t first = begin; first < end; first += kCutPoints) {
         if (context.progress.cancelled()) return;
         const size_t count = std::min(kCutPoints, end - first);
-        CutOptions options{clamp2_, error_, max_cut_, 0};
+        CutOptions options{clamp2_, error_, max_cut_, 0, &context.progress};
         if (tree_.slot_count() > 1)
           options.slot = Rng(seed_, Stage::representative, points.pixel[first], first).next_below(tree_.slot_count());
         cuts->grow(tree_, scene_->accel(), options, points, first, count);

@@ -124,7 +124,7 @@ class MultidimensionalLightcuts final : public Integrator {
   bool shade_pixels(const ShadePoints& points, std::span<const PixelRun> pixels, Workspace& work,
                     const Progress& progress) const {
     if (progress.cancelled()) return false;
-    make_blocks(points, pixels, work);
+    if (!make_blocks(points, pixels, work, progress)) return false;
     work.total.fill(0.0f);
     work.sum.fill({});
     work.counts.fill({});
@@ -222,13 +222,16 @@ class MultidimensionalLightcuts final : public Integrator {
 
   // ---- Trees of the pixels' points ----
 
-  void make_blocks(const ShadePoints& points, std::span<const PixelRun> pixels, Workspace& work) const {
+  // false: cancelled.
+  bool make_blocks(const ShadePoints& points, std::span<const PixelRun> pixels, Workspace& work,
+                   const Progress& progress) const {
     work.blocks.clear();
     work.reps.clear();
     // Points of each pixel by place and normal, so that runs of them are clusters.
     ShadePoints sorted;
     std::vector<PixelRun> runs;
     for (const PixelRun& pixel : pixels) {
+      if (progress.cancelled()) return false;
       runs.push_back({sorted.size(), pixel.count});
       if (pixel.count <= kLanes) {
         for (size_t i = 0; i < pixel.count; ++i) sorted.push(points.get(pixel.first + i));
@@ -245,6 +248,7 @@ class MultidimensionalLightcuts final : public Integrator {
     std::iota(lanes.begin(), lanes.end(), 0u);
     make_block(sorted, runs, lanes, work);
     work.reps.finish();
+    return true;
   }
 
   // Appends a block of these runs of points, which belong to these pixels, and the blocks below it.

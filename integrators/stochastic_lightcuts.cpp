@@ -88,7 +88,7 @@ class StochasticLightcuts final : public Integrator {
     const uint32_t bounds = choose_cut(count, progress, work);
     for (size_t i = 0; i < count; ++i) {
       PointCounts c;
-      radiance[first + i] = shade_point(points.get(first + i), work, c);
+      radiance[first + i] = shade_point(points.get(first + i), progress, work, c);
       c.bounds = bounds;
       if (!counts.empty()) counts[first + i] = c;
       total.clusters += c.clusters, total.rays += c.rays, total.bounds += c.bounds;
@@ -115,8 +115,9 @@ class StochasticLightcuts final : public Integrator {
       }
     };
     for (uint32_t root : tree_.roots()) add(root);
+    uint32_t steps = 0;
     while (!work.heap.empty() && work.heap.size() + work.leaves.size() < size_) {
-      if (evaluated % 4096 == 0 && progress.cancelled()) break;
+      if (++steps % 1024 == 0 && progress.cancelled()) break;
       std::pop_heap(work.heap.begin(), work.heap.end());
       const uint32_t child = tree_.node(work.heap.back().node).first_child;
       work.heap.pop_back();
@@ -130,10 +131,12 @@ class StochasticLightcuts final : public Integrator {
     return evaluated;
   }
 
-  Rgb shade_point(const SurfacePoint& point, Workspace& work, PointCounts& c) const {
+  Rgb shade_point(const SurfacePoint& point, const Progress& progress, Workspace& work, PointCounts& c) const {
     work.rays.clear(), work.light.clear();
     Rng rng = place_rng(*scene_, point, seed_, Stage::representative);
+    uint32_t steps = 0;
     for (const CutNode& cut : work.heap) {
+      if (steps++ % 1024 == 0 && progress.cancelled()) break;
       const Draw draw = draw_light(cut.node, point, rng);
       if (!(draw.probability > 0.0f)) continue;
       const Vpl& light = tree_.lights()[draw.light];

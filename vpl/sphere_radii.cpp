@@ -7,7 +7,7 @@
 
 namespace lumicut {
 
-void make_spheres(std::span<Vpl> lights, float scale, float scene_radius) {
+void make_spheres(std::span<Vpl> lights, float scale, float scene_radius, const Progress* progress) {
   if (lights.empty()) return;
   const float least = kLeastSphere * scene_radius, largest = kLargestSphere * scene_radius;
   std::vector<double> places(3 * lights.size());
@@ -15,6 +15,7 @@ void make_spheres(std::span<Vpl> lights, float scale, float scene_radius) {
     for (int k = 0; k < 3; ++k) places[3 * i + static_cast<size_t>(k)] = static_cast<double>(lights[i].position[k]);
   const BallQueryTree tree(places, 3);
   parallel_chunks(lights.size(), 1024, [&](size_t begin, size_t end) {
+    if (progress != nullptr) progress->check();
     BallQueryTree::Scratch scratch;
     std::array<uint32_t, kSphereNeighbour + 1> index;  // with the light itself
     std::array<double, kSphereNeighbour + 1> dist2;

@@ -5,6 +5,7 @@
 
 #include <span>
 
+#include "core/progress.h"
 #include "vpl/vpl.h"
 
 namespace lumicut {
@@ -14,6 +15,6 @@ inline constexpr float kLeastSphere = 1e-3f, kLargestSphere = 0.1f;  // of the s
 
 // Oriented lights become spheres of `scale` times the distance to their tenth neighbour among `lights`; where there are
 // not so many, of the largest radius.
-void make_spheres(std::span<Vpl> lights, float scale, float scene_radius);
+void make_spheres(std::span<Vpl> lights, float scale, float scene_radius, const Progress* progress = nullptr);
 
 }  // namespace lumicut

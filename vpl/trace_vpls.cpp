@@ -229,7 +229,7 @@ VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progr
     const size_t first = set.lights.size();
     trace_indirect(scene, emitters, options, indirect, progress, set);
     if (options.sphere_scale > 0.0f)
-      make_spheres(std::span(set.lights).subspan(first), options.sphere_scale, scene.radius());
+      make_spheres(std::span(set.lights).subspan(first), options.sphere_scale, scene.radius(), &progress);
     progress.check();
   }
   return set;

@@ -1,0 +1,216 @@
+// No integrator goes on for ever, or for long after it was cancelled.
+#include <gtest/gtest.h>
+
+#include <ctime>
+
+#include <thread>
+
+#include "tests/support/render.h"
+
+namespace lumicut {
+namespace {
+
+std::vector<const char*> ids() {
+  std::vector<const char*> all;
+  for (const IntegratorEntry& entry : integrators()) all.push_back(entry.id);
+  return all;
+}
+
+// Parameters with which a point costs about as much as it can.
+test::Settings heavy_settings(const std::string& id) {
+  if (id == "lightcuts" || id == "multidimensional_lightcuts") return {{"error", "0"}};
+  if (id == "illumination_cut") return {{"error", "0"}, {"visibility", "full"}};
+  if (id == "stochastic_lightcuts") return {{"lights", "100000"}};
+  if (id == "light_slice") return {{"columns", "3000"}, {"representatives", "4"}};
+  if (id == "row_column_sampling") return {{"rows", "2000"}, {"columns", "3000"}};
+  if (id == "path_tracer") return {{"samples", "100000"}};
+  return {};
+}
+
+// Cancels when so many rays were traced, and counts those after it.
+struct RayWatch {
+  Progress* progress = nullptr;
+  uint64_t cancel_at = 0;
+  std::atomic<uint64_t> traced{0}, after{0};
+
+  void count(uint64_t rays) {
+    if (progress == nullptr) return;
+    if (progress->cancelled()) after += rays;
+    if ((traced += rays) >= cancel_at) progress->cancel();
+  }
+};
+
+class WatchedAccel final : public Accel {
+ public:
+  WatchedAccel(const AccelGeometry& geometry, RayWatch& watch)
+      : inner_(make_accel(kDefaultAccel, geometry, {})), watch_(watch) {}
+  AccelInfo info() const override { return inner_->info(); }
+  void intersect(std::span<RayHit> rays) const override {
+    watch_.count(rays.size());
+    inner_->intersect(rays);
+  }
+  void occluded(std::span<Ray> rays) const override {
+    watch_.count(rays.size());
+    inner_->occluded(rays);
+  }
+  void occluded_from_point(const Vec3f& light, bool directional, const float* px, const float* py, const float* pz,
+                           size_t n, uint8_t* out) const override {
+    watch_.count(n);
+    inner_->occluded_from_point(light, directional, px, py, pz, n, out);
+  }
+
+ private:
+  std::unique_ptr<Accel> inner_;
+  RayWatch& watch_;
+};
+
+class Cancelling : public testing::TestWithParam<const char*> {
+ protected:
+  // true: it ended by Error(cancelled).
+  static bool cancelled(const Scene& scene, const char* id, const VplSet& vpls, const test::Settings& settings,
+                        uint32_t samples, float compensate, Progress& progress, bool shade = true) {
+    const IntegratorEntry* entry = find_integrator(id);
+    Params params(all_params(*entry));
+    for (const auto& [name, value] : settings) params.set(name, value);
+    Stats stats;
+    FrameOptions options;
+    options.width = 64, options.height = 48, options.samples = samples, options.tile_size = 64;
+    options.crop = {0, 0, options.width, options.height};
+    options.compensate = compensate;
+    Film film(options.crop);
+    Arena arena(2);
+    try {
+      arena.run([&] {
+        const auto integrator = entry->create();
+        integrator->prepare(scene, vpls, params, {progress, stats});
+        if (shade) render_frame(scene, *integrator, options, film, {progress, stats}, [](const Rect&) {});
+      });
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::cancelled) << error.what();
+      return true;
+    }
+    return false;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Registry, Cancelling, testing::ValuesIn(ids()),
+                         [](const auto& entry) { return std::string(entry.param); });
+
+TEST_P(Cancelling, FewRaysAreTracedAfterIt) {
+  RayWatch watch;
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 10000);
+  scene->set_trace([&](const AccelGeometry& geometry) { return std::make_unique<WatchedAccel>(geometry, watch); });
+  Progress unseen;
+  scene->commit(unseen);
+  // Camera rays of one batch, the many samples that a coarse tile has; then what is shaded.
+  struct Case {
+    uint32_t samples;
+    float compensate;
+    uint64_t cancel_at;
+  };
+  for (const auto& [samples, compensate, cancel_at] :
+       {Case{256, 0.0f, 1}, Case{1, 0.0f, 5000}, Case{16, 0.0f, 200000}, Case{64, 0.1f, 1000000}}) {
+    Progress progress;
+    watch.progress = &progress, watch.cancel_at = cancel_at, watch.traced = 0, watch.after = 0;
+    const bool stopped = cancelled(*scene, GetParam(), vpls, heavy_settings(GetParam()), samples, compensate, progress);
+    EXPECT_TRUE(stopped || watch.traced < cancel_at);
+    // Two threads, each within some batches of rays. A million a second is slow: a tenth of a second.
+    EXPECT_LT(watch.after, 200000u) << samples << " samples, cancelled at " << cancel_at;
+  }
+}
+
+double cpu_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+// In processor time, which other work on the machine does not stretch.
+TEST_P(Cancelling, EndsPreparingSoon) {
+  const auto scene = test::make_room();
+  Rng rng(1, Stage::test);
+  VplSet vpls;
+  for (int i = 0; i < 100000; ++i) {
+    Vpl v;
+    v.kind = VplKind::oriented;
+    v.position = test::random_point(rng, 1.0f), v.normal = test::random_direction(rng);
+    v.intensity = {1, 1, 1};
+    vpls.lights.push_back(v);
+  }
+  for (const double moment : {0.005, 0.04, 0.2}) {
+    Progress progress;
+    std::atomic<bool> done{false};
+    std::thread work([&] {
+      cancelled(*scene, GetParam(), vpls, {}, 1, 0.0f, progress, false);
+      done = true;
+    });
+    const double start = cpu_seconds();
+    while (!done && cpu_seconds() - start < moment) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    const double before = cpu_seconds();
+    progress.cancel();
+    work.join();
+    // .2 s of each thread are promised; sanitizers and old processors take several times as long.
+    EXPECT_LT(cpu_seconds() - before, 3.0) << "cancelled after " << moment << " s";
+  }
+}
+
+// Meshes that are turned, stretched, mirrored and moved; a lamp and a sun.
+std::unique_ptr<Scene> instanced_scene(uint64_t seed, const char* accel) {
+  auto scene = std::make_unique<Scene>(Scene::Config{accel, true, ""});
+  scene->set_materials({test::diffuse(0.5f, 0.5f, 0.5f)});
+  Rng rng(seed, Stage::test);
+  Mesh mesh;
+  if (seed == 0) {
+    test::add_quad(mesh, {-1, 0, -1}, {-1, 0, 1}, {1, 0, 1}, {1, 0, -1}, 0);
+    Transform moved;
+    moved.m[3] = 0.5f, moved.m[7] = 0.3f;
+    mesh.instances = {Transform{}, moved};
+  } else {
+    for (int i = 0; i < 20; ++i)
+      test::add_quad(mesh, test::random_point(rng, 1), test::random_point(rng, 1), test::random_point(rng, 1),
+                     test::random_point(rng, 1), 0);
+    for (uint64_t i = 0; i < 2 + seed % 4; ++i) {
+      Transform t;
+      for (int k = 0; k < 12; ++k) t.m[k] += 0.4f * (rng.next_float() - 0.5f);
+      if (i % 3 == 2) t.m[0] = -t.m[0];
+      mesh.instances.push_back(t);
+    }
+  }
+  scene->add_mesh(std::move(mesh));
+  Light lamp, sun;
+  lamp.position = {0, 2, 0.5f}, lamp.value = {5, 5, 5};
+  sun.type = LightType::sun, sun.direction = {0, -1, 0}, sun.value = {1, 1, 1};
+  scene->set_lights(seed % 2 == 0 ? std::vector<Light>{lamp} : std::vector<Light>{lamp, sun});
+  Camera camera;
+  camera.position = {0, 2, 4};
+  camera.right = {1, 0, 0}, camera.forward = normalize(Vec3f{0, -0.5f, -1});
+  camera.up = cross(camera.right, camera.forward);
+  scene->set_camera(camera);
+  Progress progress;
+  scene->commit(progress);
+  return scene;
+}
+
+class InstancedScenes : public testing::TestWithParam<const char*> {};
+
+INSTANTIATE_TEST_SUITE_P(Registry, InstancedScenes, testing::ValuesIn(ids()),
+                         [](const auto& entry) { return std::string(entry.param); });
+
+TEST_P(InstancedScenes, EndOnEmbreeToo) {
+  const auto mean = [&](const Scene& scene, const VplSet& vpls) {
+    double sum = 0;
+    for (const Rgb& c : test::render(scene, GetParam(), vpls, {}, 24, 18).radiance) sum += luminance(c);
+    return sum;
+  };
+  for (uint64_t seed = 0; seed <= 14; ++seed) {
+    const auto embree = instanced_scene(seed, "embree"), ours = instanced_scene(seed, "bvh");
+    const VplSet vpls = test::lights_of(*ours, 60);
+    // Triangles that meet at a ray's end may hide it or not, by rounding; sampling methods then draw otherwise.
+    const double a = mean(*embree, vpls), b = mean(*ours, vpls);
+    EXPECT_NEAR(a, b, 0.1 * b) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace lumicut
