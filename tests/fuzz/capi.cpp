@@ -41,6 +41,10 @@ constexpr float kSpecial[] = {0.0f,
                               std::numeric_limits<float>::quiet_NaN(),
                               3.14159265f};
 
+constexpr std::initializer_list<const char*> kBuilders = {
+    "agglomerative", "agglomerative-parallel", "binned-agglomerative", "binned", "binned-longest",
+    "sweep",         "binned+reinsert",        "sweep+reinsert:5x3"};
+
 // Cancels what a blocking call works on when it takes long. What does not hear of it meets libFuzzer's time limit.
 class Watchdog {
  public:
@@ -250,8 +254,10 @@ class Session {
   }
 
   lumicut_result create_scene() {
-    const char* accel = word({"agglomerative", "embree"});
-    const auto* desc = descriptors(make<lumicut_scene_desc>(), 1, [&](lumicut_scene_desc& d) { d.accel = accel; });
+    const char* accel = word({"bvh", "embree", "agglomerative"});
+    const char* builder = rarely(3) ? word(kBuilders) : nullptr;
+    const auto* desc = descriptors(make<lumicut_scene_desc>(), 1,
+                                   [&](lumicut_scene_desc& d) { d.accel = accel, d.builder = builder; });
     lumicut_scene made = nullptr;
     const lumicut_result result = lumicut_scene_create(handle<lumicut_device>(kDevice), desc, &made);
     return add(kScene, result, made);
@@ -578,10 +584,8 @@ class Session {
     const auto* positions = keep(changed(g.positions));
     const auto* indices = keep(changed(g.indices));
     const auto* corners = keep(changed(std::vector<float>{0, 0, 0, 1, 1, 1, 2, 0, 0, 3, 1, 1}));
-    const char* kind = word({"agglomerative", "embree"});
-    const char* builder = in_.ConsumeBool() ? nullptr
-                                            : word({"agglomerative", "parallel", "buckets", "binned", "binned-longest",
-                                                    "sweep", "buckets+reinsert:5x3", "binned+reinsert"});
+    const char* kind = word({"bvh", "embree", "agglomerative"});
+    const char* builder = rarely(3) ? word(kBuilders) : nullptr;
     auto usual = make<lumicut_accel_desc>();
     usual.position_count = g.positions.size() / 3;
     usual.triangle_count = boxes ? 0 : g.indices.size() / 3;
