@@ -2,6 +2,7 @@
 
 #include <cstring>
 #include <fstream>
+#include <sstream>
 
 #include "core/error.h"
 
@@ -15,12 +16,11 @@ FaceMesh make_face_mesh(std::span<const float> positions, std::span<const uint32
   return mesh;
 }
 
-void write_ply_mesh(const std::string& path, const FaceMesh& mesh,
-                    std::span<const std::array<uint8_t, 3>> face_colours) {
+std::string ply_of(const FaceMesh& mesh, std::span<const std::array<uint8_t, 3>> face_colours) {
   if (face_colours.size() != mesh.faces.size())
     fail_argument("mesh: " + std::to_string(face_colours.size()) + " colours for " + std::to_string(mesh.faces.size()) +
                   " faces");
-  std::ofstream out(path, std::ios::binary);
+  std::ostringstream out;
   out << "ply\nformat binary_little_endian 1.0\nelement vertex " << mesh.vertices.size()
       << "\nproperty float x\nproperty float y\nproperty float z\nelement face " << mesh.faces.size()
       << "\nproperty list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\nproperty uchar "
@@ -36,7 +36,7 @@ void write_ply_mesh(const std::string& path, const FaceMesh& mesh,
     std::memcpy(record + 13, face_colours[f].data(), 3);
     out.write(record, sizeof record);
   }
-  if (!out.flush()) fail_argument("mesh: cannot write " + path);
+  return std::move(out).str();
 }
 
 }  // namespace lumicut

@@ -13,8 +13,7 @@ namespace lumicut {
 // Of xyz a vertex and three indices a triangle, as readers give them (io::read_obj_positions).
 FaceMesh make_face_mesh(std::span<const float> positions, std::span<const uint32_t> indices);
 
-// Binary PLY with a colour a face (0 to 255).
-void write_ply_mesh(const std::string& path, const FaceMesh& mesh,
-                    std::span<const std::array<uint8_t, 3>> face_colours);
+// The bytes of a binary PLY with a colour a face (0 to 255).
+std::string ply_of(const FaceMesh& mesh, std::span<const std::array<uint8_t, 3>> face_colours);
 
 }  // namespace lumicut

@@ -1,28 +1,21 @@
-// Files appear whole or not at all: written beside their place under another name, then renamed.
+// Files appear whole or not at all: written beside their place under another name, brought to the disk, then renamed.
+//
+// A symbolic link stays, and what it points to is replaced. An earlier file's mode, and owner where permitted, pass to
+// the new one. Pipes and character devices (/dev/null, /dev/stdout) are written to as they are and never replaced;
+// folders, block devices, sockets and files without write permission are refused. A run that is killed leaves the
+// earlier file; a nameless temporary file (O_TMPFILE) where the file system has them leaves nothing else either, and
+// what is left elsewhere is removed by the next run that writes into the folder.
 #pragma once
 
 #include <string>
+#include <string_view>
 
 namespace lumicut::io {
 
-class AtomicFile {
- public:
-  // `path` is where the file shall be. Throws FileError when its folder does not exist or cannot be written to.
-  explicit AtomicFile(const std::string& path);
-  ~AtomicFile();  // removes the temporary file unless committed
-  AtomicFile(const AtomicFile&) = delete;
-  AtomicFile& operator=(const AtomicFile&) = delete;
+// Throws FileError when nothing can be written at `path`: before hours of work, not after. Changes nothing.
+void check_writable(const std::string& path);
 
-  // Write here; has the same extension as `path`.
-  const std::string& temporary() const { return temporary_; }
-  void commit();
-
- private:
-  std::string path_, temporary_;
-  bool committed_ = false;
-};
-
-// Writes bytes atomically. Throws FileError.
-void write_whole_file(const std::string& path, const std::string& bytes);
+// Throws FileError on any error, a full disk included; then the earlier file stands as it was.
+void write_whole_file(const std::string& path, std::string_view bytes);
 
 }  // namespace lumicut::io

@@ -3,6 +3,7 @@
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfIO.h>
 #include <ImfOutputFile.h>
 #include <ImfStringAttribute.h>
 #include <OpenImageIO/filesystem.h>
@@ -32,6 +33,29 @@ std::array<std::string, 3> channel_names(const ImageLayer& layer) {
   return {layer.name + ".R", layer.name + ".G", layer.name + ".B"};
 }
 
+// In memory, since what OpenEXR's destructor writes fails without a word. `failed` tells of memory that ran out there.
+class MemoryStream : public Imf::OStream {
+ public:
+  MemoryStream() : Imf::OStream("memory") {}
+  void write(const char bytes[], int count) override {
+    const auto size = static_cast<size_t>(count);
+    failed_ = true;
+    if (at_ + size > bytes_.size()) bytes_.resize(at_ + size);
+    failed_ = false;
+    std::copy_n(bytes, size, bytes_.begin() + static_cast<std::ptrdiff_t>(at_));
+    at_ += size;
+  }
+  uint64_t tellp() override { return at_; }
+  void seekp(uint64_t to) override { at_ = to; }
+  bool failed() const { return failed_; }
+  const std::string& bytes() const { return bytes_; }
+
+ private:
+  std::string bytes_;
+  size_t at_ = 0;
+  bool failed_ = false;
+};
+
 }  // namespace
 
 const ImageLayer* Image::find(const std::string& name) const {
@@ -47,7 +71,7 @@ void write_exr(const std::string& path, const Image& image, bool half_floats) {
   const size_t pixels = static_cast<size_t>(image.width) * static_cast<size_t>(image.height);
   if (pixels == 0)
     throw FileError(path, fmt::format("an image of {} x {} pixels cannot be written", image.width, image.height));
-  AtomicFile file(path);
+  MemoryStream stream;
   try {
     Imf::Header header(frame, window);
     header.compression() = Imf::ZIP_COMPRESSION;
@@ -77,7 +101,7 @@ void write_exr(const std::string& path, const Image& image, bool half_floats) {
                                                  size * components * static_cast<size_t>(image.width)));
       }
     }
-    Imf::OutputFile out(file.temporary().c_str(), header);
+    Imf::OutputFile out(stream, header);
     out.setFrameBuffer(buffer);
     out.writePixels(image.height);
   } catch (const FileError&) {
@@ -85,7 +109,8 @@ void write_exr(const std::string& path, const Image& image, bool half_floats) {
   } catch (const std::exception& error) {
     throw FileError(path, fmt::format("cannot be written: {}", error.what()));
   }
-  file.commit();
+  if (stream.failed()) throw std::bad_alloc();
+  write_whole_file(path, stream.bytes());
 }
 
 std::string encode_png(const std::string& name, const std::vector<uint8_t>& pixels, int width, int height,

@@ -91,8 +91,7 @@ void add_layers(const std::string& path, OIIO::ImageInput& in, int part, Image& 
 }  // namespace
 
 Image read_image(const std::string& path) {
-  std::error_code code;
-  if (!std::filesystem::is_regular_file(path, code)) throw FileError(path, "no such file");
+  check_regular_file(path);
   OIIO::ImageSpec wish;
   wish.attribute("oiio:UnassociatedAlpha", 1);  // colours as they stand in the file
   const auto in = OIIO::ImageInput::open(path, &wish);

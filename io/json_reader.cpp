@@ -58,18 +58,19 @@ std::string nearest_word(const std::string& word, const std::vector<std::string>
   return best;
 }
 
-json parse_json(const std::string& text, const std::string& file) {
+template <typename Json>
+Json parse_json(const std::string& text, const std::string& file) {
   std::vector<std::set<std::string>> keys;
-  const auto watch = [&](int depth, json::parse_event_t event, json& parsed) {
+  const auto watch = [&](int depth, typename Json::parse_event_t event, Json& parsed) {
     if (depth > kMaxDepth) throw FileError(file, fmt::format("is nested deeper than {} levels", kMaxDepth));
-    if (event == json::parse_event_t::object_start) keys.emplace_back();
-    if (event == json::parse_event_t::object_end) keys.pop_back();
-    if (event == json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second)
-      throw FileError(file, fmt::format("the key {} stands twice in one object", shown(parsed)));
+    if (event == Json::parse_event_t::object_start) keys.emplace_back();
+    if (event == Json::parse_event_t::object_end) keys.pop_back();
+    if (event == Json::parse_event_t::key && !keys.back().insert(parsed.template get<std::string>()).second)
+      throw FileError(file, fmt::format("the key {} stands twice in one object", shown(json(parsed))));
     return true;
   };
   try {
-    return json::parse(text, watch);
+    return Json::parse(text, watch);
   } catch (const json::parse_error& error) {
     const size_t end = std::min(text.size(), error.byte > 0 ? error.byte - 1 : 0);
     const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(end), '\n');
@@ -82,6 +83,8 @@ json parse_json(const std::string& text, const std::string& file) {
     throw FileError(file, fmt::format("not readable as JSON: {}", error.what()));
   }
 }
+template json parse_json(const std::string&, const std::string&);
+template nlohmann::ordered_json parse_json(const std::string&, const std::string&);
 
 void JsonValue::fail(const std::string& text) const {
   throw FileError(file_, path_.empty() ? text : path_ + ": " + text);

@@ -14,7 +14,10 @@ namespace lumicut::io {
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Parses `text`; syntax errors name the line and column. Duplicate keys and nesting beyond 64 levels are errors.
-nlohmann::json parse_json(const std::string& text, const std::string& file);
+template <typename Json = nlohmann::json>
+Json parse_json(const std::string& text, const std::string& file);
+extern template nlohmann::json parse_json(const std::string&, const std::string&);
+extern template nlohmann::ordered_json parse_json(const std::string&, const std::string&);
 
 // A value that knows where it stands.
 class JsonValue {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <iterator>
 #include <map>
@@ -13,6 +12,7 @@
 #include "io/file_error.h"
 #include "io/ies_file.h"
 #include "io/json_reader.h"
+#include "io/path_variables.h"
 #include "io/scene_obj.h"
 #include "io/sky.h"
 #include "io/texture_store.h"
@@ -68,9 +68,10 @@ Matrix rotation(const Vec& axis, double angle) {
 
 class SceneReader {
  public:
-  explicit SceneReader(const std::string& path) : path_(path), textures_(scene_.textures) {}
+  explicit SceneReader(const std::string& path)
+      : path_(path), variables_(fs::path(path).parent_path().string()), textures_(scene_.textures) {}
 
-  SceneData read() {
+  SceneData read() try {
     const auto json = parse_json(read_whole_file(path_, kMaxSceneBytes), path_);
     JsonObject root(JsonValue(json, path_, ""));
     root.text("description", "");
@@ -91,30 +92,20 @@ class SceneReader {
     std::move(lamps_.begin(), lamps_.end(), std::back_inserter(scene_.meshes));
     if (scene_.meshes.empty()) root.value().fail("has neither meshes nor visible lights: there is nothing to see");
     check_lit();
+    scene_.warnings.rewrite([&](const std::string& text) { return variables_.hide(text); });
     return std::move(scene_);
+  } catch (const FileError& error) {
+    throw FileError(variables_.hide(error.what()));
   }
 
  private:
   // ---- Paths ----
 
-  // ${NAME} stands for the environment's variable; relative paths start at the scene's folder.
-  std::string resolve(const JsonValue& value) const {
-    std::string text = value.text();
-    if (text.empty()) value.fail("is empty, but must be a path");
-    for (size_t at; (at = text.find("${")) != std::string::npos;) {
-      const size_t end = text.find('}', at);
-      if (end == std::string::npos) value.fail_expected("a path in which every ${ is closed by }");
-      const std::string name = text.substr(at + 2, end - at - 2);
-      const char* found = std::getenv(name.c_str());
-      std::string replacement = found ? found : "";
-      if (replacement.empty() && name == "LUMICUT_SCENES") replacement = default_meshes(value);
-      if (replacement.empty()) value.fail(fmt::format("the environment variable {} is not set", name));
-      if (replacement.find("${") != std::string::npos)
-        value.fail(fmt::format("the environment variable {} holds ${{", name));
-      text = text.substr(0, at) + replacement + text.substr(end + 1);
-    }
-    const fs::path path(text);
-    return path.is_absolute() ? text : (fs::path(path_).parent_path() / path).lexically_normal().string();
+  std::string resolve(const JsonValue& value) {
+    return variables_.resolve(value, [&](const std::string& name) {
+      if (name != "LUMICUT_SCENES") value.fail(fmt::format("the environment variable {} is not set", name));
+      return default_meshes(value);
+    });
   }
 
   // The nearest folder shared/scenes beside one of the folders that hold the scene file.
@@ -768,6 +759,7 @@ class SceneReader {
   }
 
   std::string path_;
+  PathVariables variables_;
   SceneData scene_;
   TextureStore textures_;
   std::map<std::string, uint32_t> by_name_;

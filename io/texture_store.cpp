@@ -1,31 +1,28 @@
 #include "io/texture_store.h"
 
-#include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 
 #include <cmath>
 #include <filesystem>
 
 #include "io/file_error.h"
+#include "io/image_size.h"
 
 namespace lumicut::io {
 
 namespace {
 
-constexpr uint64_t kMaxPixels = uint64_t{1} << 28;
-
 Texture read_texture(const std::string& path, TextureUse use, uint32_t flags, const std::string& user) {
   std::error_code code;
-  if (!std::filesystem::is_regular_file(path, code))
-    throw FileError(path, fmt::format("no such texture, wanted by {}", user));
+  if (!std::filesystem::exists(path, code)) throw FileError(path, fmt::format("no such texture, wanted by {}", user));
+  check_regular_file(path);
   const auto input = OIIO::ImageInput::open(path);
   if (!input) throw FileError(path, fmt::format("not readable as a texture of {}: {}", user, OIIO::geterror()));
   const OIIO::ImageSpec spec = input->spec();
   if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.deep)
     throw FileError(path, fmt::format("a texture of {} x {} x {} pixels cannot be used (by {})", spec.width,
                                       spec.height, spec.depth, user));
-  if (static_cast<uint64_t>(spec.width) * static_cast<uint64_t>(spec.height) > kMaxPixels)
-    throw FileError(path, fmt::format("has {} x {} pixels; at most {} are read", spec.width, spec.height, kMaxPixels));
+  check_image_size(path, *input);
   if (spec.nchannels < 1 || spec.nchannels > 4)
     throw FileError(path, fmt::format("has {} channels; 1 to 4 can be used (by {})", spec.nchannels, user));
 

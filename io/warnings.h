@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -16,6 +17,10 @@ class Warnings {
   void add(const std::string& kind, const std::string& file, const std::string& text);
   void add(const std::string& kind, const std::string& file, int line, const std::string& text);
 
+  // Each text becomes what `change` makes of it.
+  void rewrite(const std::function<std::string(const std::string&)>& change) {
+    for (auto& text : texts_) text = change(text);
+  }
   bool empty() const { return texts_.empty(); }
   // "FILE: line N: text" in the order found, then a line for each kind with more than kShown.
   std::vector<std::string> lines() const;

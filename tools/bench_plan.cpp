@@ -26,7 +26,8 @@ const std::vector<std::string> kTimeMeasures = {"render_seconds", "total_seconds
 
 class PlanReader {
  public:
-  PlanReader(std::string folder, const io::Api& api) : folder_(std::move(folder)), api_(api) {
+  PlanReader(const std::string& folder, const io::Api& api) : api_(api) {
+    plan_.variables = io::PathVariables(folder);
     lumicut_device_desc desc{};
     desc.struct_size = sizeof(desc);
     desc.abi_major = LUMICUT_ABI_MAJOR;
@@ -124,23 +125,13 @@ class PlanReader {
     value.fail_expected("a number, a text or a truth value");
   }
 
-  // Relative paths start at the plan; ${NAME} is the environment's. A name that is not set makes the scene absent.
-  std::string path_of(const JsonValue& value, std::string& absent) const {
-    std::string text = value.text();
-    if (text.empty()) value.fail("is empty, but must be a path");
-    for (size_t at; (at = text.find("${")) != std::string::npos;) {
-      const size_t end = text.find('}', at);
-      if (end == std::string::npos) value.fail_expected("a path in which every ${ is closed by }");
-      const std::string name = text.substr(at + 2, end - at - 2);
-      const char* found = std::getenv(name.c_str());
-      if (found == nullptr || std::string(found).find("${") != std::string::npos) {
-        absent = fmt::format("the environment variable {} is not set", name);
-        return "";
-      }
-      text = text.substr(0, at) + found + text.substr(end + 1);
-    }
-    const fs::path path(text);
-    return path.is_absolute() ? text : (fs::path(folder_) / path).lexically_normal().string();
+  // A name that is not set makes the scene absent.
+  std::string path_of(const JsonValue& value, std::string& absent) {
+    const std::string path = plan_.variables.resolve(value, [&](const std::string& name) {
+      absent = fmt::format("the environment variable {} is not set", name);
+      return std::string();
+    });
+    return absent.empty() ? path : "";
   }
 
   void scene(const JsonValue& value) {
@@ -296,7 +287,6 @@ class PlanReader {
     return m;
   }
 
-  std::string folder_;
   const io::Api& api_;
   io::Handle<lumicut_device> device_{api_};
   std::vector<std::string> integrators_;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "io/library.h"
+#include "io/path_variables.h"
 
 namespace lumicut::tools {
 
@@ -51,6 +52,7 @@ struct BenchPlan {
   bool strict = false;  // of the command alone: warnings of scenes are errors
   std::vector<BenchScene> scenes;
   std::vector<BenchRun> runs;
+  io::PathVariables variables;
 };
 
 // Reads a plan; relative paths start at its folder. Throws FileError naming file, key and value: also for integrators,

@@ -7,6 +7,7 @@
 #include "io/atomic_file.h"
 #include "io/file_error.h"
 #include "io/image_file.h"
+#include "io/json_reader.h"
 #include "tools/child_process.h"
 #include "tools/commands.h"
 
@@ -84,7 +85,7 @@ RenderStats render_in_child(const std::vector<std::string>& arguments, const std
     }
     throw std::runtime_error(text);
   }
-  const auto stats = ordered_json::parse(io::read_whole_file(stats_file));
+  const auto stats = io::parse_json<ordered_json>(io::read_whole_file(stats_file), stats_file);
   std::error_code code;
   fs::remove(stats_file, code);
   return stats;
@@ -135,7 +136,11 @@ BenchReference get_reference(const BenchGroup& group, const std::string& folder,
   ordered_json key = {{"arguments", arguments}, {"lights", lights_hash}};
   std::error_code code;
   if (fs::is_regular_file(image, code) && fs::is_regular_file(notes, code)) {
-    const auto old = ordered_json::parse(io::read_whole_file(notes), nullptr, false);
+    ordered_json old;
+    try {
+      old = io::parse_json<ordered_json>(io::read_whole_file(notes), notes);
+    } catch (const io::FileError&) {  // broken: rendered anew
+    }
     if (old.is_object() && old.contains("key") && old["key"] == key && old.contains("info")) {
       info = old["info"];
       info["cached"] = true;

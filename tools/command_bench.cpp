@@ -14,6 +14,7 @@
 #include "io/atomic_file.h"
 #include "io/file_error.h"
 #include "io/image_file.h"
+#include "io/json_reader.h"
 #include "tools/bench_machine.h"
 #include "tools/bench_plan.h"
 #include "tools/bench_references.h"
@@ -104,7 +105,7 @@ class BenchCommand {
  public:
   explicit BenchCommand(const Options& options) : o_(options), bar_(options.quiet) {}
 
-  void run() {
+  void run() try {
     read_plan();
     if (o_.check) {
       fmt::print("{}: {} scenes, {} runs: good\n", plan_.file, plan_.scenes.size(), plan_.runs.size());
@@ -117,8 +118,8 @@ class BenchCommand {
     } catch (const Interrupted&) {
       bar_.wipe();
       write_tables();
-      fmt::print(stderr, "lumicut: interrupted; {} rows stand in {}; go on with --resume\n",
-                 results_["rows"].size() + old_rows_.size(), results_file());
+      print_error("lumicut: interrupted; {} rows stand in {}; go on with --resume\n",
+                  results_["rows"].size() + old_rows_.size(), results_file());
       throw SilentExit(kInterrupted);
     }
     bar_.wipe();
@@ -129,6 +130,8 @@ class BenchCommand {
     const auto failed = std::count_if(results_["rows"].begin(), results_["rows"].end(),
                                       [](const auto& row) { return row.contains("failed"); });
     if (failed > 0) throw std::runtime_error(fmt::format("bench: {} runs failed", failed));
+  } catch (const io::FileError& error) {
+    throw io::FileError(plan_.variables.hide(error.what()));
   }
 
  private:
@@ -138,7 +141,7 @@ class BenchCommand {
 
   void say(const std::string& text) {
     bar_.wipe();
-    if (!o_.quiet) fmt::print(stderr, "{}\n", text);
+    if (!o_.quiet) print_error("{}\n", plan_.variables.hide(text));
   }
 
   // ---- What to run ----
@@ -194,7 +197,7 @@ class BenchCommand {
     if (stands && !o_.resume && !o_.overwrite)
       throw UsageError(
           fmt::format("{} stands already: --resume goes on with it, --overwrite begins anew", results_file()));
-    io::AtomicFile writable(results_file());
+    io::check_writable(results_file());
     results_ = {{"format", kFormat},
                 {"name", plan_.name},
                 {"description", plan_.description},
@@ -213,7 +216,7 @@ class BenchCommand {
                 {"references", ordered_json::array()},
                 {"rows", ordered_json::array()}};
     if (!stands || !o_.resume) return;
-    const auto old = ordered_json::parse(io::read_whole_file(results_file()), nullptr, false);
+    const auto old = io::parse_json<ordered_json>(io::read_whole_file(results_file()), results_file());
     if (!old.is_object() || old.value("format", "") != kFormat || !old.contains("rows") || !old["rows"].is_array())
       throw io::FileError(results_file(), fmt::format("is no {} to go on with", kFormat));
     // Rows of another library or machine are no part of this table: ratios between them would mean nothing.
@@ -243,7 +246,7 @@ class BenchCommand {
 
   void skip(const BenchScene& scene, const std::string& why) {
     say(fmt::format("{}: skipped: {}", scene.name, why));
-    results_["skipped"].push_back({{"scene", scene.name}, {"why", why}});
+    results_["skipped"].push_back({{"scene", scene.name}, {"why", plan_.variables.hide(why)}});
     skipped_.push_back(scene.name);
   }
 
@@ -285,7 +288,7 @@ class BenchCommand {
           throw;
         } catch (const std::exception& error) {
           describe(group, plan_.runs[r], row);
-          row["failed"] = error.what();
+          row["failed"] = plan_.variables.hide(error.what());
           say(fmt::format("{}, {}: failed: {}", group.name(), plan_.runs[r].name, error.what()));
         }
         row["job"] = job_of(group, plan_.runs[r], hash);

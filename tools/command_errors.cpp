@@ -85,7 +85,7 @@ class ErrorsCommand {
       std::filesystem::create_directory(o_.folder, code);
       if (!std::filesystem::is_directory(o_.folder, code))
         throw io::FileError(o_.folder, "is no folder, and cannot be made one");
-      for (const char* name : kFiles) io::AtomicFile file(path(name));
+      for (const char* name : kFiles) io::check_writable(path(name));
     }
     create();
     render_all();

@@ -119,7 +119,7 @@ class FlythroughCommand {
 
   void run() {
     for (const auto& path : {o_.output, o_.png, o_.stats, o_.save_state})
-      if (!path.empty()) io::AtomicFile file(path);
+      if (!path.empty()) io::check_writable(path);
     create();
     const io::SceneData data = io::read_scene(o_.scene);
     tell_warnings(data.warnings, o_.scene, o_.strict);

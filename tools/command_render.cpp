@@ -74,7 +74,7 @@ std::vector<Channel> choose_channels(const io::Api& api, const std::string& aske
 void log_message(void* user, int32_t level, const char* text) {
   static_cast<ProgressBar*>(user)->wipe();
   static const char* const kNames[] = {"error", "warning", "info", "debug"};
-  fmt::print(stderr, "lumicut: {}: {}\n", kNames[std::clamp(level, 0, 3)], text);
+  print_error("lumicut: {}: {}\n", kNames[std::clamp(level, 0, 3)], text);
 }
 
 uint64_t peak_bytes() {
@@ -125,14 +125,14 @@ class RenderCommand {
   // Before hours of work, not after.
   void check_outputs() {
     for (const auto& path : {o_.output, o_.png, o_.stats, o_.vpl_out})
-      if (!path.empty()) io::AtomicFile file(path);
+      if (!path.empty()) io::check_writable(path);
     if (!o_.heat_maps.empty()) {
       const std::filesystem::path folder(o_.heat_maps);
       std::error_code code;
       std::filesystem::create_directory(folder, code);
       if (!std::filesystem::is_directory(folder, code))
         throw io::FileError(o_.heat_maps, "is no folder, and cannot be made one");
-      for (const CountLayer& layer : kCountLayers) io::AtomicFile file(heat_map_path(layer));
+      for (const CountLayer& layer : kCountLayers) io::check_writable(heat_map_path(layer));
     }
     if (!o_.size.empty()) size_ = numbers(o_.size, 'x', 2, "--size");
     if (!o_.crop.empty()) crop_ = numbers(o_.crop, ',', 4, "--crop");
@@ -220,7 +220,7 @@ class RenderCommand {
     if (!told_) return;
     for (const auto& line : preflight_lines(preflight(
              api(), device_.get(), *told_, preflight_options(api(), integrator_.get(), desc_.width, desc_.height))))
-      fmt::print(stderr, "lumicut: {}\n", line);
+      print_error("lumicut: {}\n", line);
     told_.reset();
     stop_if_interrupted();
   }
@@ -310,7 +310,7 @@ class RenderCommand {
       return;
     bar_.wipe();
     if (o_.verbosity >= 1)
-      fmt::print(stderr, "lumicut: warning: {} holds more passes than were asked for: the image is of all {}\n",
+      print_error("lumicut: warning: {} holds more passes than were asked for: the image is of all {}\n",
                  o_.checkpoint, status.passes_done);
   }
 
@@ -343,7 +343,7 @@ class RenderCommand {
     } catch (const io::FileError& error) {
       if (!checkpoint_error_) {
         bar_.wipe();
-        fmt::print(stderr, "lumicut: warning: {}; the image will be written all the same\n", error.what());
+        print_error("lumicut: warning: {}; the image will be written all the same\n", error.what());
       }
       checkpoint_error_ = error;
     }

@@ -11,6 +11,7 @@
 
 #include "io/atomic_file.h"
 #include "io/file_error.h"
+#include "io/json_reader.h"
 #include "lumicut_report_assets.h"
 #include "tools/bench_table.h"
 #include "tools/commands.h"
@@ -262,8 +263,8 @@ std::string page(const ordered_json& results, const std::string& file, int most)
 void report(const Options& o) {
   std::string output = o.output;
   if (output.empty()) output = (std::filesystem::path(o.results).parent_path() / "report.html").string();
-  { io::AtomicFile writable(output); }
-  const auto results = ordered_json::parse(io::read_whole_file(o.results), nullptr, false);
+  io::check_writable(output);
+  const auto results = io::parse_json<ordered_json>(io::read_whole_file(o.results), o.results);
   if (!results.is_object() || results.value("format", "") != "lumicut-bench/1")
     throw io::FileError(o.results, "is no result of `lumicut bench`: its \"format\" is not \"lumicut-bench/1\"");
   std::string html;

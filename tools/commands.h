@@ -1,7 +1,10 @@
 // What the subcommands of `lumicut` share.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <csignal>
+#include <cstdio>
 #include <stdexcept>
 #include <string>
 
@@ -41,6 +44,12 @@ extern volatile std::sig_atomic_t interrupted;
 void catch_interrupts();
 inline void stop_if_interrupted() {
   if (interrupted) throw Interrupted();
+}
+
+// On standard error. Throws nothing when that cannot be written to: a render shall not end for a lost message.
+template <typename... T>
+void print_error(fmt::format_string<T...> format, T&&... values) {
+  std::fputs(fmt::format(format, std::forward<T>(values)...).c_str(), stderr);
 }
 
 // Each adds its subcommand to the command line; its callback does the work.

@@ -6,6 +6,7 @@
 
 #include "io/file_error.h"
 #include "io/library.h"
+#include "io/standard_streams.h"
 #include "tools/commands.h"
 
 namespace lumicut::tools {
@@ -49,7 +50,7 @@ int run(int argc, char** argv) {
   add_check(app);
   add_info(app);
   const auto complain = [](const char* text, int code) {
-    fmt::print(stderr, "lumicut: {}\n", text);
+    print_error("lumicut: {}\n", text);
     return code;
   };
   try {
@@ -68,6 +69,7 @@ int run(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return complain("out of memory", kFailed);
   } catch (const std::exception& error) {
+    if (std::ferror(stdout)) return kBadFile;  // close_standard_output tells of it
     return complain(error.what(), kFailed);
   }
 }
@@ -75,4 +77,7 @@ int run(int argc, char** argv) {
 }  // namespace
 }  // namespace lumicut::tools
 
-int main(int argc, char** argv) { return lumicut::tools::run(argc, argv); }
+int main(int argc, char** argv) {
+  lumicut::io::open_standard_streams();
+  return lumicut::io::close_standard_output("lumicut", lumicut::tools::run(argc, argv), lumicut::tools::kBadFile);
+}

@@ -1,10 +1,11 @@
 #include "tools/progress_bar.h"
 
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
+
+#include "tools/commands.h"
 
 namespace lumicut::tools {
 
@@ -17,15 +18,15 @@ void ProgressBar::show(const std::string& phase, double fraction, double seconds
   constexpr int kWidth = 30;
   const double f = std::clamp(fraction, 0.0, 1.0);
   const int done = static_cast<int>(f * kWidth);
-  fmt::print(stderr, "\r\033[K[{}{}] {:3.0f} %  {}  {:.1f} s", std::string(static_cast<size_t>(done), '#'),
-             std::string(static_cast<size_t>(kWidth - done), '.'), f * 100, phase, seconds);
+  print_error("\r\033[K[{}{}] {:3.0f} %  {}  {:.1f} s", std::string(static_cast<size_t>(done), '#'),
+              std::string(static_cast<size_t>(kWidth - done), '.'), f * 100, phase, seconds);
   std::fflush(stderr);
   shown_ = true;
 }
 
 void ProgressBar::wipe() {
   if (!shown_) return;
-  fmt::print(stderr, "\r\033[K");
+  print_error("\r\033[K");
   std::fflush(stderr);
   shown_ = false;
 }

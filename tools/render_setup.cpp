@@ -30,7 +30,7 @@ void add_setup_options(CLI::App& command, RenderSetup& setup) {
 }
 
 void tell_warnings(const io::Warnings& warnings, const std::string& file, bool strict) {
-  for (const auto& warning : warnings.lines()) fmt::print(stderr, "lumicut: warning: {}\n", warning);
+  for (const auto& warning : warnings.lines()) print_error("lumicut: warning: {}\n", warning);
   if (strict && !warnings.empty()) throw io::FileError(file, "has warnings, which --strict takes as errors");
 }
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
+#include <sstream>
 
 #include "core/error.h"
 #include "core/rng.h"
@@ -15,7 +15,10 @@
 #include "geometry/face_kmeans.h"
 #include "geometry/hitting_set.h"
 #include "geometry/mesh_file.h"
+#include "io/atomic_file.h"
+#include "io/file_error.h"
 #include "io/scene_obj.h"
+#include "io/standard_streams.h"
 #ifdef LUMICUT_HAS_CGAL
 #include "geometry/dnet.h"
 #include "geometry/epsilon_net.h"
@@ -24,19 +27,13 @@
 namespace lumicut {
 namespace {
 
-std::ifstream open(const std::string& path) {
-  std::ifstream in(path);
-  if (!in) fail_argument("cannot open " + path);
-  return in;
-}
+std::istringstream open(const std::string& path) { return std::istringstream(io::read_whole_file(path)); }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 void write_points(const std::string& path, const std::vector<Point2>& points, const std::vector<uint32_t>& chosen) {
-  std::ofstream file;
-  if (path != "-") file.open(path);
   std::string text = "index,x,y\n";
   char line[96];
   for (const uint32_t i : chosen) {
@@ -46,8 +43,7 @@ void write_points(const std::string& path, const std::vector<Point2>& points, co
   if (path == "-") {
     std::fwrite(text.data(), 1, text.size(), stdout);
   } else {
-    file << text;
-    if (!file.flush()) fail_argument("cannot write " + path);
+    io::write_whole_file(path, text);
   }
 }
 
@@ -57,7 +53,13 @@ struct HittingArguments {
   int size = 1000;
 };
 
+void check_output(const std::string& path) {
+  if (path != "-") io::check_writable(path);
+}
+
 int hitting_set(const HittingArguments& a) {
+  check_output(a.out);
+  if (!a.picture.empty()) io::check_writable(a.picture);
   auto points_file = open(a.points), disks_file = open(a.disks);
   const auto points = read_points_csv(points_file, a.points);
   const auto disks = read_disks_csv(disks_file, a.disks);
@@ -87,7 +89,8 @@ int hitting_set(const HittingArguments& a) {
 #endif
   }
   write_points(a.out, points, chosen);
-  if (!a.picture.empty()) draw_hitting_set(a.picture, points, disks, chosen, a.size);
+  if (!a.picture.empty())
+    io::write_whole_file(a.picture, draw_hitting_set(a.picture.ends_with(".svg"), points, disks, chosen, a.size));
   return 0;
 }
 
@@ -99,6 +102,7 @@ struct NetArguments {
 
 int net(const NetArguments& a) {
 #ifdef LUMICUT_HAS_CGAL
+  check_output(a.out);
   auto file = open(a.points);
   const auto points = read_points_csv(file, a.points);
   EpsilonNetOptions o;
@@ -163,8 +167,8 @@ int recluster(const ReclusterArguments& a) {
     char name[32];
     std::snprintf(name, sizeof name, "frame_%04d", frame);
     const std::string base = (std::filesystem::path(a.out) / name).string();
-    write_ply_mesh(base + ".ply", now, colours);
-    write_png(base + ".png", draw_mesh(now, colours, a.width, a.height, a.z_up));
+    io::write_whole_file(base + ".ply", ply_of(now, colours));
+    io::write_whole_file(base + ".png", png_of(draw_mesh(now, colours, a.width, a.height, a.z_up)));
   };
   if (a.method == "tree") {
     FaceClusterTree tree(start, {});
@@ -195,49 +199,55 @@ int recluster(const ReclusterArguments& a) {
   return 0;
 }
 
-}  // namespace
-}  // namespace lumicut
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   CLI::App app{"Geometry: hitting sets and epsilon-nets for disks, face clusters on deforming meshes"};
   app.require_subcommand(1);
-  lumicut::HittingArguments h;
-  auto* hitting = app.add_subcommand("hitting-set", "Few points that hit every disk");
-  hitting->add_option("--points", h.points, "CSV: x,y")->required();
-  hitting->add_option("--disks", h.disks, "CSV: x,y,radius")->required();
-  hitting->add_option("--out", h.out, "CSV of the chosen points: index,x,y (-: standard output)");
-  hitting->add_option("--picture", h.picture, "Picture of the instance, .svg or .png");
-  hitting->add_option("--size", h.size, "Its size in pixels")->check(CLI::Range(50, 10000));
-  hitting->add_option("--method", h.method, "Solver")->check(CLI::IsMember({"default", "greedy", "dnet"}));
-  hitting->add_flag("--drop-empty", h.drop_empty, "Leave out disks without points rather than refuse them");
-  lumicut::NetArguments n;
-  auto* net = app.add_subcommand("net", "Points in every disk that holds at least epsilon of all points");
-  net->add_option("--points", n.points, "CSV: x,y")->required();
-  net->add_option("--epsilon", n.epsilon, "In (0, 1]");
-  net->add_option("--out", n.out, "CSV of the chosen points (-: standard output)");
-  net->add_flag("--thesis", n.thesis, "The thesis's construction rather than the certified one");
-  lumicut::ReclusterArguments r;
-  auto* recluster = app.add_subcommand(
+  HittingArguments h;
+  auto* hitting_command = app.add_subcommand("hitting-set", "Few points that hit every disk");
+  hitting_command->add_option("--points", h.points, "CSV: x,y")->required();
+  hitting_command->add_option("--disks", h.disks, "CSV: x,y,radius")->required();
+  hitting_command->add_option("--out", h.out, "CSV of the chosen points: index,x,y (-: standard output)");
+  hitting_command->add_option("--picture", h.picture, "Picture of the instance, .svg or .png");
+  hitting_command->add_option("--size", h.size, "Its size in pixels")->check(CLI::Range(50, 10000));
+  hitting_command->add_option("--method", h.method, "Solver")->check(CLI::IsMember({"default", "greedy", "dnet"}));
+  hitting_command->add_flag("--drop-empty", h.drop_empty, "Leave out disks without points rather than refuse them");
+  NetArguments n;
+  auto* net_command = app.add_subcommand("net", "Points in every disk that holds at least epsilon of all points");
+  net_command->add_option("--points", n.points, "CSV: x,y")->required();
+  net_command->add_option("--epsilon", n.epsilon, "In (0, 1]");
+  net_command->add_option("--out", n.out, "CSV of the chosen points (-: standard output)");
+  net_command->add_flag("--thesis", n.thesis, "The thesis's construction rather than the certified one");
+  ReclusterArguments r;
+  auto* recluster_command = app.add_subcommand(
       "recluster", "Deforms a mesh and keeps its face clusters up; writes coloured PLY and PNG frames");
-  recluster->add_option("mesh", r.mesh, "OBJ file")->required();
-  recluster->add_option("--out", r.out, "Folder of the frames");
-  recluster->add_option("--frames", r.frames, "How many")->check(CLI::Range(1, 100000));
-  recluster->add_option("--method", r.method, "k-means clusters, or a level of the balanced tree")
+  recluster_command->add_option("mesh", r.mesh, "OBJ file")->required();
+  recluster_command->add_option("--out", r.out, "Folder of the frames");
+  recluster_command->add_option("--frames", r.frames, "How many")->check(CLI::Range(1, 100000));
+  recluster_command->add_option("--method", r.method, "k-means clusters, or a level of the balanced tree")
       ->check(CLI::IsMember({"kmeans", "tree"}));
-  recluster->add_option("--clusters", r.clusters, "Of k-means");
-  recluster->add_option("--level", r.level, "Of the tree")->check(CLI::Range(0, 64));
-  recluster->add_option("--reach", r.reach, "Of the deformation, in diagonals")->check(CLI::Range(1e-6, 100.0));
-  recluster->add_option("--amount", r.amount, "Of the deformation, in diagonals")->check(CLI::Range(0.0, 100.0));
-  recluster->add_option("--width", r.width, "Of the pictures")->check(CLI::Range(16, 10000));
-  recluster->add_option("--height", r.height, "Of the pictures")->check(CLI::Range(16, 10000));
-  recluster->add_flag("--z-up", r.z_up, "The mesh stands along z");
+  recluster_command->add_option("--clusters", r.clusters, "Of k-means");
+  recluster_command->add_option("--level", r.level, "Of the tree")->check(CLI::Range(0, 64));
+  recluster_command->add_option("--reach", r.reach, "Of the deformation, in diagonals")->check(CLI::Range(1e-6, 100.0));
+  recluster_command->add_option("--amount", r.amount, "Of the deformation, in diagonals")
+      ->check(CLI::Range(0.0, 100.0));
+  recluster_command->add_option("--width", r.width, "Of the pictures")->check(CLI::Range(16, 10000));
+  recluster_command->add_option("--height", r.height, "Of the pictures")->check(CLI::Range(16, 10000));
+  recluster_command->add_flag("--z-up", r.z_up, "The mesh stands along z");
   CLI11_PARSE(app, argc, argv);
   try {
-    if (*hitting) return lumicut::hitting_set(h);
-    if (*net) return lumicut::net(n);
-    return lumicut::recluster(r);
+    if (*hitting_command) return hitting_set(h);
+    if (*net_command) return net(n);
+    return recluster(r);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "lumicut-geometry: %s\n", e.what());
     return 1;
   }
+}
+
+}  // namespace
+}  // namespace lumicut
+
+int main(int argc, char** argv) {
+  lumicut::io::open_standard_streams();
+  return lumicut::io::close_standard_output("lumicut-geometry", lumicut::run(argc, argv), 1);
 }

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
+#include <sstream>
 
 #include "core/error.h"
 #include "core/rng.h"
@@ -36,22 +36,22 @@ void Picture::dot(double x, double y, double radius, Colour c) {
       if ((i - x) * (i - x) + (j - y) * (j - y) <= radius * radius) set(i, j, c);
 }
 
-void write_png(const std::string& path, const Picture& p) {
-  std::ofstream out(path, std::ios::binary);
+std::string png_of(const Picture& p) {
+  std::string out;
   const auto chunk = [&](const char* type, const std::vector<uint8_t>& data) {
     const auto big = [&](uint32_t v) {
       const char b[4] = {static_cast<char>(v >> 24), static_cast<char>(v >> 16), static_cast<char>(v >> 8),
                          static_cast<char>(v)};
-      out.write(b, 4);
+      out.append(b, 4);
     };
     big(static_cast<uint32_t>(data.size()));
-    out.write(type, 4);
-    if (!data.empty()) out.write(reinterpret_cast<const char*>(data.data()), static_cast<std::streamsize>(data.size()));
+    out.append(type, 4);
+    out.append(data.begin(), data.end());
     uLong crc = crc32(0, reinterpret_cast<const Bytef*>(type), 4);
     if (!data.empty()) crc = crc32(crc, data.data(), static_cast<uInt>(data.size()));
     big(static_cast<uint32_t>(crc));
   };
-  out.write("\x89PNG\r\n\x1a\n", 8);
+  out.append("\x89PNG\r\n\x1a\n", 8);
   const auto w = static_cast<uint32_t>(p.width), h = static_cast<uint32_t>(p.height);
   const auto byte = [](uint32_t v, int shift) { return static_cast<uint8_t>(v >> shift); };
   chunk("IHDR", {byte(w, 24), byte(w, 16), byte(w, 8), byte(w, 0), byte(h, 24), byte(h, 16), byte(h, 8), byte(h, 0), 8,
@@ -65,11 +65,11 @@ void write_png(const std::string& path, const Picture& p) {
   uLongf size = compressBound(rows.size());
   std::vector<uint8_t> packed(size);
   if (compress2(packed.data(), &size, rows.data(), rows.size(), 6) != Z_OK)
-    throw Error(ErrorCode::internal, "zlib cannot compress " + path);
+    throw Error(ErrorCode::internal, "zlib cannot compress a picture");
   packed.resize(size);
   chunk("IDAT", packed);
   chunk("IEND", {});
-  if (!out.flush()) fail_argument("cannot write " + path);
+  return out;
 }
 
 Colour label_colour(uint32_t label) {
@@ -120,8 +120,8 @@ Picture draw_mesh(const FaceMesh& mesh, std::span<const Colour> colours, int wid
   return picture;
 }
 
-void draw_hitting_set(const std::string& path, std::span<const Point2> points, std::span<const Disk> disks,
-                      std::span<const uint32_t> chosen, int size) {
+std::string draw_hitting_set(bool svg, std::span<const Point2> points, std::span<const Disk> disks,
+                             std::span<const uint32_t> chosen, int size) {
   Point2 lo{1e300, 1e300}, hi{-1e300, -1e300};
   const auto cover = [&](const Point2& p, double r) {
     lo = {std::min(lo.x, p.x - r), std::min(lo.y, p.y - r)};
@@ -134,8 +134,8 @@ void draw_hitting_set(const std::string& path, std::span<const Point2> points, s
   const auto x_of = [&](const Point2& p) { return 10 + (p.x - lo.x) * scale; };
   const auto y_of = [&](const Point2& p) { return size - 10 - (p.y - lo.y) * scale; };
   const double dot = std::clamp(0.2 * size / std::sqrt(static_cast<double>(points.size()) + 1), 0.7, 4.0);
-  if (path.size() > 4 && path.substr(path.size() - 4) == ".svg") {
-    std::ofstream out(path);
+  if (svg) {
+    std::ostringstream out;
     out << "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" << size << "\" height=\"" << size
         << "\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
     for (const Disk& d : disks)
@@ -147,8 +147,7 @@ void draw_hitting_set(const std::string& path, std::span<const Point2> points, s
       out << "<circle cx=\"" << x_of(points[i]) << "\" cy=\"" << y_of(points[i]) << "\" r=\"" << 1.6 * dot
           << "\" fill=\"#d02020\"/>\n";
     out << "</svg>\n";
-    if (!out.flush()) fail_argument("cannot write " + path);
-    return;
+    return std::move(out).str();
   }
   Picture picture(size, size, {255, 255, 255});
   for (const Disk& d : disks) {
@@ -161,7 +160,7 @@ void draw_hitting_set(const std::string& path, std::span<const Point2> points, s
   }
   for (const Point2& p : points) picture.dot(x_of(p), y_of(p), dot, {144, 144, 144});
   for (const uint32_t i : chosen) picture.dot(x_of(points[i]), y_of(points[i]), 1.6 * dot, {208, 32, 32});
-  write_png(path, picture);
+  return png_of(picture);
 }
 
 }  // namespace lumicut

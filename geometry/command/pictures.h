@@ -23,8 +23,8 @@ struct Picture {
   void dot(double x, double y, double radius, Colour c);
 };
 
-// Throws invalid_argument when the file cannot be written.
-void write_png(const std::string& path, const Picture& picture);
+// The bytes of a PNG.
+std::string png_of(const Picture& picture);
 
 // Colours that differ for neighbouring numbers.
 Colour label_colour(uint32_t label);
@@ -32,8 +32,8 @@ Colour label_colour(uint32_t label);
 // The mesh from (1, .5, 2) of its box, z or y up, flat-shaded with a colour a face.
 Picture draw_mesh(const FaceMesh& mesh, std::span<const Colour> face_colours, int width, int height, bool z_up);
 
-// Disks as outlines, points grey, chosen points red; .svg or .png by the path's ending.
-void draw_hitting_set(const std::string& path, std::span<const Point2> points, std::span<const Disk> disks,
-                      std::span<const uint32_t> chosen, int size);
+// Disks as outlines, points grey, chosen points red: the bytes of an SVG or of a PNG.
+std::string draw_hitting_set(bool svg, std::span<const Point2> points, std::span<const Disk> disks,
+                             std::span<const uint32_t> chosen, int size);
 
 }  // namespace lumicut

@@ -106,6 +106,20 @@ TEST(ImageFile, WritingToAWrongPlaceLeavesNothing) {
   EXPECT_EQ(folder.file_count(), 0u);
 }
 
+TEST(ImageFile, KeepsTheOldImageWhenTheDiskIsFull) {
+  const TemporaryFolder folder;
+  write_exr(folder / "whole.exr", example(), false);
+  const size_t size = read_whole_file(folder / "whole.exr").size();
+  folder.write("a.exr", "old");
+  // Offsets of the rows are written last, over zeros that stand there already.
+  for (const size_t missing : {size_t{1}, size_t{100}, size / 2, size}) {
+    const FileLimit limit(size - missing);
+    expect_in(error_of([&] { write_exr(folder / "a.exr", example(), false); }), {"a.exr", "cannot be written"});
+  }
+  EXPECT_EQ(read_whole_file(folder / "a.exr"), "old");
+  EXPECT_EQ(folder.file_count(), 2u);
+}
+
 TEST(ImageFile, PngStartsAsPngsDo) {
   const TemporaryFolder folder;
   write_png(folder / "a.png", {255, 0, 0, 0, 255, 0}, 2, 1, 3);

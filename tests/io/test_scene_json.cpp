@@ -309,6 +309,37 @@ TEST(SceneJson, PathsMayNameEnvironmentVariables) {
   unsetenv("LUMICUT_TEST_FOLDER");
 }
 
+TEST(SceneJson, MessagesDoNotPrintTheValuesOfVariables) {
+  const TemporaryFolder folder;
+  setenv("LUMICUT_TEST_SECRET", "hunter2", 1);
+  setenv("LUMICUT_TEST_PLACE", (folder / "hunter2").c_str(), 1);
+  setenv("LUMICUT_TEST_OBJ", (folder / "hunter2/a.obj").c_str(), 1);
+  folder.write("hunter2/a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
+  folder.write("hunter2/a.mtl", "newmtl a\nKd x\n");
+  folder.write("hunter2/bad.ies", "no profile");
+  const auto message = [&](const char* key, const std::string& value) {
+    json scene = json::parse(kScene);
+    if (key == std::string("obj")) scene["meshes"] = {{{"obj", value}}};
+    if (key == std::string("image")) scene["environment"] = {{"image", value}};
+    if (key == std::string("ies"))
+      scene["lights"] = {{{"type", "point"}, {"position", {0, 1, 0}}, {"ies", value}, {"value", 1}}};
+    return error_of([&] { read_scene(folder.write("scene.json", scene.dump())); });
+  };
+  for (const auto& [key, value, wanted] :
+       {std::array{"obj", "/nowhere/${LUMICUT_TEST_SECRET}", "/nowhere/${LUMICUT_TEST_SECRET}: no such file"},
+        std::array{"obj", "./x/../${LUMICUT_TEST_SECRET}/b.obj", "./x/../${LUMICUT_TEST_SECRET}/b.obj: no such file"},
+        std::array{"obj", "${LUMICUT_TEST_PLACE}", "${LUMICUT_TEST_PLACE}: is a folder"},
+        std::array{"obj", "${LUMICUT_TEST_PLACE}/a.obj", "${LUMICUT_TEST_PLACE}/a.mtl"},
+        std::array{"obj", "${LUMICUT_TEST_OBJ}", "${LUMICUT_TEST_OBJ}/../a.mtl"},
+        std::array{"image", "${LUMICUT_TEST_PLACE}/none.hdr", "${LUMICUT_TEST_PLACE}/none.hdr: no such texture"},
+        std::array{"ies", "${LUMICUT_TEST_PLACE}/bad.ies", "${LUMICUT_TEST_PLACE}/bad.ies"}}) {
+    const std::string text = message(key, value);
+    expect_in(text, {wanted});
+    EXPECT_EQ(text.find("hunter2"), std::string::npos) << text;
+  }
+  for (const char* name : {"LUMICUT_TEST_SECRET", "LUMICUT_TEST_PLACE", "LUMICUT_TEST_OBJ"}) unsetenv(name);
+}
+
 TEST(SceneJson, SyntaxErrorsNameLineAndColumn) {
   const TemporaryFolder folder;
   const auto text_error = [&](const std::string& text) {
