@@ -13,7 +13,6 @@
 
 #include <algorithm>
 #include <array>
-#include <filesystem>
 
 #include "io/atomic_file.h"
 #include "io/file_error.h"

@@ -19,6 +19,12 @@ Json parse_json(const std::string& text, const std::string& file);
 extern template nlohmann::json parse_json(const std::string&, const std::string&);
 extern template nlohmann::ordered_json parse_json(const std::string&, const std::string&);
 
+// The text of `json`; bytes that are no UTF-8, which paths may hold, come out as U+FFFD.
+template <typename Json>
+std::string json_text(const Json& json, int indent = -1) {
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
+
 // A value that knows where it stands.
 class JsonValue {
  public:

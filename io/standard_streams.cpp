@@ -17,14 +17,16 @@ void open_standard_streams() {
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
-int close_standard_output(const char* command, int code, int failure) {
+int close_standard_output(const char* command, int code, int failure, int error) {
   const bool failed = std::ferror(stdout) != 0;
-  errno = 0;
-  const bool closed = std::fclose(stdout) == 0;
-  if (closed && !failed) return code;
-  if (errno != EPIPE)
-    std::fprintf(stderr, "%s: standard output: cannot be written%s%s\n", command, errno ? ": " : "",
-                 errno ? std::strerror(errno) : "");
+  if (std::fclose(stdout) != 0) {
+    error = errno;
+  } else if (!failed) {
+    return code;
+  }
+  if (error != EPIPE)
+    std::fprintf(stderr, "%s: standard output: cannot be written%s%s\n", command, error ? ": " : "",
+                 error ? std::strerror(error) : "");
   return code != 0 ? code : failure;
 }
 

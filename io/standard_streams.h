@@ -8,7 +8,7 @@ namespace lumicut::io {
 void open_standard_streams();
 
 // Last in main. Brings standard output to its end and returns the exit code: `code`, or `failure`, with a message, when
-// not all of it could be written. A reader that has gone (`| head`) is no error worth a message.
-int close_standard_output(const char* command, int code, int failure);
+// not all of it could be written. `error` is errno of an earlier attempt, where known. A reader that has gone (`| head`) is no error worth a message.
+int close_standard_output(const char* command, int code, int failure, int error = 0);
 
 }  // namespace lumicut::io

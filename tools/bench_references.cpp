@@ -151,7 +151,7 @@ BenchReference get_reference(const BenchGroup& group, const std::string& folder,
   info["file"] = fs::path("references") / (group.name() + ".exr");
   arguments.insert(arguments.end(), {"-o", image});
   describe_times(render_in_child(arguments, base + ".stats.json", waiting), info);
-  io::write_whole_file(notes, ordered_json{{"key", key}, {"info", info}}.dump(2) + "\n");
+  io::write_whole_file(notes, io::json_text(ordered_json{{"key", key}, {"info", info}}, 2) + "\n");
   info["cached"] = false;
   return load(image, info);
 }

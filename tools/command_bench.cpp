@@ -152,7 +152,7 @@ class BenchCommand {
     if (o_.plan.empty()) {
       ordered_json plan = {{"name", "command line"}, {"scenes", o_.scenes}, {"runs", ordered_json::array()}};
       for (const auto& run : o_.runs) plan["runs"].push_back(run_of_text(run));
-      plan_ = parse_bench_plan(plan.dump(), "command line", "", api());
+      plan_ = parse_bench_plan(io::json_text(plan), "command line", "", api());
     } else {
       plan_ = read_bench_plan(o_.plan, api());
     }
@@ -558,7 +558,7 @@ class BenchCommand {
   void save() {
     ordered_json all = results_;
     for (const auto& row : old_rows_) all["rows"].push_back(row);
-    io::write_whole_file(results_file(), all.dump(1) + "\n");
+    io::write_whole_file(results_file(), io::json_text(all, 1) + "\n");
   }
 
   void write_tables() {

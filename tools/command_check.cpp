@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "io/json_reader.h"
 #include "io/library.h"
 #include "io/scene_json.h"
 #include "io/scene_upload.h"
@@ -80,7 +81,7 @@ void check_scene(const Options& o) {
       all["forecast"]["integrator"] = o.integrator, all["forecast"]["width"] = desc.width;
       all["forecast"]["height"] = desc.height, all["forecast"]["samples"] = desc.samples;
     }
-    fmt::print("{}\n", all.dump(2));
+    fmt::print("{}\n", io::json_text(all, 2));
   } else {
     fmt::print("{}\n", o.scene);
     for (const auto& line : preflight_lines(found)) fmt::print("  {}\n", line);

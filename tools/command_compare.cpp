@@ -8,6 +8,7 @@
 #include "io/atomic_file.h"
 #include "io/file_error.h"
 #include "io/image_file.h"
+#include "io/json_reader.h"
 #include "tools/commands.h"
 #include "tools/heat_map.h"
 
@@ -152,7 +153,7 @@ void compare(const Options& options) {
   if (!options.hdr_flip_image.empty())
     write_grey(options.hdr_flip_image, hdr_flip_image(image, reference, metric_options.pixels_per_degree).image, a);
   if (options.json) {
-    fmt::print("{}\n", json.dump(2));
+    fmt::print("{}\n", io::json_text(json, 2));
     return;
   }
   fmt::print("RMSE                 {:.5f}  of the reference's mean, {:.5g}\n", m.rmse, m.reference_mean);

@@ -15,6 +15,7 @@
 #include "io/atomic_file.h"
 #include "io/file_error.h"
 #include "io/image_file.h"
+#include "io/json_reader.h"
 #include "io/library.h"
 #include "io/scene_json.h"
 #include "io/scene_upload.h"
@@ -92,7 +93,7 @@ class ErrorsCommand {
     bar_.wipe();
     const ordered_json result = split();
     if (!o_.folder.empty()) write(result);
-    if (o_.json) fmt::print("{}\n", result.dump(2));
+    if (o_.json) fmt::print("{}\n", io::json_text(result, 2));
   }
 
  private:
@@ -270,7 +271,7 @@ class ErrorsCommand {
     const Pixels* const images[] = {&image_, &sum_, &expected_, &truth_};
     for (size_t i = 0; i < 4; ++i) image.layers.push_back({kLayers[i], 3, *images[i]});
     io::write_exr(path("errors.exr"), image, false);
-    io::write_whole_file(path("errors.json"), result.dump(2) + "\n");
+    io::write_whole_file(path("errors.json"), io::json_text(result, 2) + "\n");
   }
 
   const Options& o_;

@@ -245,7 +245,7 @@ class FlythroughCommand {
     stats["amortised_seconds_per_view"] = amortised;
     stats["prepare"] = prepared_;
     stats["views"] = views_;
-    io::write_whole_file(o_.stats, stats.dump(2) + "\n");
+    io::write_whole_file(o_.stats, io::json_text(stats, 2) + "\n");
   }
 
   const Options& o_;

@@ -14,6 +14,7 @@
 #include "io/atomic_file.h"
 #include "io/file_error.h"
 #include "io/image_file.h"
+#include "io/json_reader.h"
 #include "io/library.h"
 #include "io/scene_json.h"
 #include "io/scene_upload.h"
@@ -114,6 +115,7 @@ class RenderCommand {
     read_scene();
     commit();
     tell();
+    check_memory(channels);
     render();
     write(channels);
     if (checkpoint_error_) throw *checkpoint_error_;  // the last state is not on the disk
@@ -237,6 +239,20 @@ class RenderCommand {
     commit_seconds_ = now() - start;
   }
 
+  // The library refuses a render beyond the memory; on top come the layers as they are written, and the file's bytes.
+  void check_memory(const std::vector<Channel>& channels) const {
+    const double pixels = crop_.empty() ? double{1} * desc_.width * desc_.height
+                                        : double{1} * (crop_[2] - crop_[0]) * (crop_[3] - crop_[1]);
+    double components = 3;  // of the PNG
+    if (!o_.output.empty())
+      for (const Channel& channel : channels) components += 2.0 * channel.components;
+    const double bytes = components * sizeof(float) * pixels;
+    const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+    if (bytes > memory)
+      throw UsageError(fmt::format("{} of {:.0f} pixels take {:.1f} GB, more than the {:.1f} GB of memory here",
+                                   o_.output, pixels, bytes / 1e9, memory / 1e9));
+  }
+
   // The whole, the crop, or the squares: each is a render of its own.
   void render() {
     std::vector<lumicut_tile> parts;
@@ -310,8 +326,8 @@ class RenderCommand {
       return;
     bar_.wipe();
     if (o_.verbosity >= 1)
-      print_error("lumicut: warning: {} holds more passes than were asked for: the image is of all {}\n",
-                 o_.checkpoint, status.passes_done);
+      print_error("lumicut: warning: {} holds more passes than were asked for: the image is of all {}\n", o_.checkpoint,
+                  status.passes_done);
   }
 
   std::string phase_text(const lumicut_status& status) const {
@@ -423,7 +439,7 @@ class RenderCommand {
         io::write_png(heat_map_path(counts), map.pixels, map.width, map.height, 3);
       }
     if (!o_.vpl_out.empty()) io::write_vpls(o_.vpl_out, lights, light_count);
-    if (!o_.stats.empty()) io::write_whole_file(o_.stats, stats.dump(2) + "\n");
+    if (!o_.stats.empty()) io::write_whole_file(o_.stats, io::json_text(stats, 2) + "\n");
     if (!o_.quiet)
       fmt::print("{}: {} lights, {}x{}, {:.2f} s, {:.0f} rays, {:.0f} bounds, {:.0f} clusters a pixel\n", o_.integrator,
                  light_count, width, height, stats["seconds"].get<double>(), stats["rays_per_pixel"].get<double>(),

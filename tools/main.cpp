@@ -2,7 +2,9 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <new>
+#include <system_error>
 
 #include "io/file_error.h"
 #include "io/library.h"
@@ -23,7 +25,8 @@ void catch_interrupts() {
 
 namespace {
 
-int run(int argc, char** argv) {
+// `output_error`: errno of what could not be printed.
+int run(int argc, char** argv, int& output_error) {
   CLI::App app(
       "Lumicut renders global illumination from many virtual lights.\n\n"
       "  lumicut info                                         what the library offers\n"
@@ -68,8 +71,11 @@ int run(int argc, char** argv) {
     return complain(error.what(), kBadFile);
   } catch (const std::bad_alloc&) {
     return complain("out of memory", kFailed);
+  } catch (const std::system_error& error) {
+    if (!std::ferror(stdout)) return complain(error.what(), kFailed);
+    output_error = error.code().value();
+    return kBadFile;  // close_standard_output tells of it
   } catch (const std::exception& error) {
-    if (std::ferror(stdout)) return kBadFile;  // close_standard_output tells of it
     return complain(error.what(), kFailed);
   }
 }
@@ -79,5 +85,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   lumicut::io::open_standard_streams();
-  return lumicut::io::close_standard_output("lumicut", lumicut::tools::run(argc, argv), lumicut::tools::kBadFile);
+  int output_error = 0;
+  const int code = lumicut::tools::run(argc, argv, output_error);
+  return lumicut::io::close_standard_output("lumicut", code, lumicut::tools::kBadFile, output_error);
 }

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lamps and the world, in the units of the Blender that runs (docs/units.md): each type agrees with Cycles to 1 %."""
 import math
+import os
 
 import bpy
 import numpy as np
@@ -125,6 +126,8 @@ class Profiles:
                 if internal:
                     text = node.ies.as_string()
                 else:
+                    if os.path.exists(source) and not os.path.isfile(source):  # a pipe would be waited for
+                        raise ies.IesError("not a plain file")
                     with open(source, encoding="latin-1") as file:
                         text = file.read()
                 table = (source if internal else bpy.path.basename(source),
