@@ -135,9 +135,9 @@ std::vector<Vec3f> to_normals(const float* xyz, uint64_t count) {
 
 std::vector<Vec3f> to_positions(const float* xyz, uint64_t count, const char* owner) {
   std::vector<Vec3f> out = to_normals(xyz, count);
+  const Checked c(owner);
   for (uint64_t i = 0; i < out.size(); ++i)
-    if (!is_finite(out[i]))
-      for (int k = 0; k < 3; ++k) Checked(owner).coordinate("positions", out[i][k], static_cast<int64_t>(3 * i) + k);
+    for (int k = 0; k < 3; ++k) c.coordinate("positions", out[i][k], static_cast<int64_t>(3 * i) + k);
   return out;
 }
 
