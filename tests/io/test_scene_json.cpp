@@ -322,7 +322,8 @@ TEST(SceneJson, MessagesDoNotPrintTheValuesOfVariables) {
     if (key == std::string("obj")) scene["meshes"] = {{{"obj", value}}};
     if (key == std::string("image")) scene["environment"] = {{"image", value}};
     if (key == std::string("ies"))
-      scene["lights"] = {{{"type", "point"}, {"position", {0, 1, 0}}, {"ies", value}, {"value", 1}}};
+      scene["lights"] = {
+          {{"type", "point"}, {"position", {0, 1, 0}}, {"ies", value}, {"value", 1}, {"direction", {0, -1, 0}}}};
     return error_of([&] { read_scene(folder.write("scene.json", scene.dump())); });
   };
   for (const auto& [key, value, wanted] :

@@ -144,7 +144,8 @@ class Input(Files):
         good = self.write_scene()
         for what, why in ((pipe, "nobody writes"), ("/dev/zero", "is a device")):
             mesh = self.write_scene("mesh.json", meshes=[{"obj": str(what), "material": "m"}])
-            ies = self.write_scene("ies.json", lights=[{"type": "point", "position": [0, 0, 2], "value": 1, "ies": str(what)}])
+            ies = self.write_scene("ies.json", lights=[{"type": "point", "position": [0, 0, 2], "value": 1, "direction": [0, 0, -1],
+                                                      "ies": str(what)}])
             for words in (["check", what, "--no-forecast"], ["check", mesh, "--no-forecast"],
                           ["check", ies, "--no-forecast"],
                           ["render", good, "--vpl-in", what, "-o", self.folder / "o.exr"],
