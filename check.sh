@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Sets up, looks at the sources, builds everything and passes all tests; then those of the library and the readers, and a
-# short run of each fuzz target, under AddressSanitizer and UndefinedBehaviorSanitizer.
-# ./check.sh release|debug|asan|tsan does one build and its tests alone.
+# Sets up, looks at the sources (format, Python, scripts), builds everything and passes all tests.
+# ./check.sh release|debug|asan|tsan does one build and its tests alone; asan runs the fuzz targets too.
+# ./check.sh tidy: clang-tidy on the library and the tools.
 set -euo pipefail
 cd "$(dirname "$0")"
 build() {
@@ -11,19 +11,18 @@ build() {
 step() { printf '\n== %s (%d s)\n' "$1" "$SECONDS"; }
 
 ./setup.sh
-if [ $# -gt 0 ]; then
-  build "$1"
-  ctest --preset "$1"
-  exit
-fi
+case ${1-} in
+  '') ;;
+  tidy) exec tools/dev/lint.sh --tidy ;;
+  *)
+    build "$1"
+    ctest --preset "$1"
+    exit ;;
+esac
 step lint
 tools/dev/lint.sh
-step "build, release"
+step "build"
 build release
-step "build, asan"
-build asan
-step "tests, asan"
-ctest --preset asan
-step "tests, release"
+step "tests"
 ctest --preset release
 step "all passed"

@@ -180,7 +180,7 @@ TEST(Errors, FieldsOfLightsAreCheckedByNameAndValue) {
       {[](L& l) { l.group = 70000; }, "lumicut_light[0].group: 70000"},
       {[](L& l) { l.value = -5; }, "lumicut_light[0].value: -5 is not in [0, inf)"},
       {[](L& l) { l.color[2] = kNan; }, "lumicut_light[0].color[2]: nan"},
-      {[](L& l) { l.position[0] = kInf; }, "lumicut_light[0].position[0]: inf is not finite"},
+      {[](L& l) { l.position[0] = kInf; }, "lumicut_light[0].position[0]: inf is not in [-9e+17, 9e+17]"},
       {[](L& l) { l.u[0] = 0; }, "lumicut_light[0].u: with v spans no area"},
       {[](L& l) { l.v[0] = 1; }, "lumicut_light[0].u: is not orthogonal to v"},
       {[](L& l) { l.v[1] = kNan; }, "lumicut_light[0].v[1]: nan"},
@@ -212,7 +212,7 @@ TEST(Errors, FieldsOfMeshesTexturesCamerasAndEnvironmentsAreCheckedByNameAndValu
   const float broken[12] = {0, 0, 0, 1, kNan, 0, 0, 1, 0, 0, 0, 0};
   const uint32_t far[3] = {0, 1, 300};
   refused_mesh([&](auto& m) { m.positions = broken, m.vertex_count = 3; },
-               "lumicut_mesh.positions[4]: nan is not finite");
+               "lumicut_mesh.positions[4]: nan is not in [-9e+17, 9e+17]");
   refused_mesh([&](auto& m) { m.indices = far, m.triangle_count = 1; },
                "lumicut_mesh.indices[2]: 300 is not below vertex_count");
   refused_mesh([&](auto& m) { m.positions = nullptr; }, "lumicut_mesh.positions: is NULL");

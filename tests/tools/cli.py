@@ -22,6 +22,7 @@ OK, FAILED, USAGE, BAD_FILE, INTERRUPTED = 0, 1, 2, 3, 130
 
 def lumicut(*arguments, env=None):
     return subprocess.run([COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=300,
+                          errors="surrogateescape",  # paths are bytes
                           env={**os.environ, **(env or {})})
 
 
