@@ -10,6 +10,13 @@ namespace lumicut {
 
 namespace {
 
+// y is drawn first: as arguments of one call, which the compiler may evaluate in either order, they gave another image
+// with another compiler.
+Vec2f random_pair(Rng& rng) {
+  const float y = rng.next_float(), x = rng.next_float();
+  return {x, y};
+}
+
 constexpr float kPi = std::numbers::pi_v<float>;
 
 Vec3f uniform_sphere(float u, float v) {
@@ -352,7 +359,8 @@ Vpl Emitters::environment_light(uint64_t i, uint64_t count, uint64_t seed) const
 
 Vec3f Emitters::sample_sun(const Light& light, Rng& rng) const {
   if (!(light.radius > 0.0f)) return light.direction;
-  return Frame(light.direction).to_world(uniform_cone(std::cos(light.radius), rng.next_float(), rng.next_float()));
+  const Vec2f at = random_pair(rng);
+  return Frame(light.direction).to_world(uniform_cone(std::cos(light.radius), at.x, at.y));
 }
 
 Vpl Emitters::sample_direct(double u, uint64_t count, Rng& rng) const {
@@ -476,12 +484,14 @@ EmittedRay Emitters::sample_ray(Rng& rng) const {
   switch (e.kind) {
     case Kind::point: {
       const Light& l = scene_.lights()[e.index];
-      ray = {l.position, uniform_sphere(rng.next_float(), rng.next_float()), l.value * (4.0f * kPi), l.group};
+      const Vec2f at = random_pair(rng);
+      ray = {l.position, uniform_sphere(at.x, at.y), l.value * (4.0f * kPi), l.group};
       break;
     }
     case Kind::spot: {
       const Light& l = scene_.lights()[e.index];
-      const Vec3f local = uniform_cone(l.cos_outer, rng.next_float(), rng.next_float());
+      const Vec2f at = random_pair(rng);
+      const Vec3f local = uniform_cone(l.cos_outer, at.x, at.y);
       const float profile = spot_falloff(spot_of(l), local.z);
       ray = {l.position, Frame(l.direction).to_world(local), l.value * (profile * 2.0f * kPi * (1.0f - l.cos_outer)),
              l.group};
@@ -521,7 +531,8 @@ EmittedRay Emitters::sample_ray(Rng& rng) const {
     case Kind::disk:
     case Kind::triangle: {
       const Surface s = sample_surface(e, rng);
-      const Vec3f local = cosine_hemisphere(rng.next_float(), rng.next_float());
+      const Vec2f at = random_pair(rng);
+      const Vec3f local = cosine_hemisphere(at.x, at.y);
       float factor = kPi / s.area_pdf;
       if (e.kind != Kind::triangle && narrowed(scene_.lights()[e.index]) && local.z > 0.0f) {
         const Vpl profile = spread_profile(scene_.lights()[e.index]);
