@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "plugin/check.h"
+#include "plugin/convert.h"
 #include "plugin/identity.h"
 #include "plugin/include/lumicut/lumicut_state.h"
 #include "plugin/objects.h"
@@ -105,16 +106,17 @@ void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uin
                differs->text());
   }
   at += h.key_bytes;
-  auto vpls = std::make_shared<VplSet>();
-  vpls->light_paths = h.light_paths;
-  vpls->lights.resize(h.lights);
-  if (h.lights > 0) std::memcpy(static_cast<void*>(vpls->lights.data()), at, h.lights * sizeof(Vpl));
+  // Lights of a file are checked as those of a host are.
+  std::vector<lumicut_vpl> saved(h.lights);
+  if (h.lights > 0) std::memcpy(saved.data(), at, h.lights * sizeof(Vpl));
   at += h.lights * sizeof(Vpl);
-  for (const Vpl& v : vpls->lights)
-    if (static_cast<uint32_t>(v.kind) >= kVplKinds || !is_finite(v.position) || !is_finite(v.normal) ||
-        (v.kind == VplKind::sphere && !(v.radius() > 0.0f && std::isfinite(v.radius()))) ||
-        (v.profile != 0 && find_profile(v.profile) == nullptr))
-      fail_bytes("a light in it makes no sense");
+  std::shared_ptr<VplSet> vpls;
+  try {
+    vpls = std::make_shared<VplSet>(to_vpls(saved.data(), h.lights));
+  } catch (const Error& error) {
+    fail_bytes(std::string("a light in it makes no sense: ") + error.what());
+  }
+  vpls->light_paths = h.light_paths;
 
   auto next = std::make_unique<Prepared>();
   next->scene = Ref(s);
