@@ -213,9 +213,13 @@ void write_all(const std::string& path, int fd, std::string_view bytes) {
 
 }  // namespace
 
-void check_writable(const std::string& path) {
+void check_writable(const std::string& path, uint64_t bytes) {
   const Target target = find_target(path);
-  if (target.kind == Target::Kind::file) Temporary file(path, target);
+  if (target.kind != Target::Kind::file) return;
+  const Temporary file(path, target);
+  if (bytes == 0) return;
+  if (const int error = posix_fallocate(file.descriptor(), 0, static_cast<off_t>(bytes)); error != 0)
+    fail_write(path, error);
 }
 
 void write_whole_file(const std::string& path, std::string_view bytes) {

@@ -7,13 +7,15 @@
 // what is left elsewhere is removed by the next run that writes into the folder.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
 namespace lumicut::io {
 
-// Throws FileError when nothing can be written at `path`: before hours of work, not after. Changes nothing.
-void check_writable(const std::string& path);
+// Throws FileError when a file of so many bytes cannot be written at `path` (links, devices and pipes: nothing): before
+// hours of work, not after. Changes nothing.
+void check_writable(const std::string& path, uint64_t bytes = 0);
 
 // Throws FileError on any error, a full disk included; then the earlier file stands as it was.
 void write_whole_file(const std::string& path, std::string_view bytes);

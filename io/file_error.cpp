@@ -10,6 +10,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "io/physical_memory.h"
+
 namespace lumicut::io {
 
 namespace {
@@ -58,7 +60,7 @@ std::string read_whole_file(const std::string& path, uint64_t max_bytes) {
   if (pipe) max_bytes = std::min(max_bytes, kMaxPipeBytes);
   if (size > max_bytes) throw FileError(path, fmt::format("has {} bytes; at most {} are read", size, max_bytes));
   // A sparse file may say more than the disk holds.
-  const uint64_t memory = static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
+  const uint64_t memory = physical_memory();
   if (size > memory / 2)
     throw FileError(path, fmt::format("has {} bytes, too many for the {} bytes of memory here", size, memory));
   std::string bytes;

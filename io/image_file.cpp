@@ -21,8 +21,6 @@ namespace lumicut::io {
 
 namespace {
 
-constexpr char kAttributePrefix[] = "lumicut:";
-
 std::array<std::string, 3> channel_names(const ImageLayer& layer) {
   if (layer.name == "radiance" && layer.components == 3) return {"R", "G", "B"};
   if (layer.name == "normal" && layer.components == 3) return {"N.X", "N.Y", "N.Z"};

@@ -8,6 +8,9 @@
 
 namespace lumicut::io {
 
+// Of the names of Image::attributes in an EXR's header.
+inline constexpr char kAttributePrefix[] = "lumicut:";
+
 struct ImageLayer {
   std::string name;           // "radiance", "depth", "normal", "albedo", "cut_size" ...
   int components = 3;         // 1 or 3

@@ -8,17 +8,11 @@
 #include "io/file_error.h"
 #include "io/image_file.h"
 #include "io/image_size.h"
+#include "io/text_lines.h"
 
 namespace lumicut::io {
 
 namespace {
-
-constexpr char kAttributePrefix[] = "lumicut:";
-
-std::string lower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
 
 struct Place {
   std::string layer;

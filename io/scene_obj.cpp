@@ -66,13 +66,6 @@ class LineBuffer : public std::streambuf {
 
 // ---- Names of files -------------------------------------------------------------------------------------------------
 
-// ASCII letters alone.
-std::string lower(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return text;
-}
-
 bool is_file(const std::filesystem::path& path) {
   std::error_code code;
   return std::filesystem::exists(path, code) && !std::filesystem::is_directory(path, code);

@@ -20,6 +20,12 @@ std::string plain_text(std::string text, const std::string& path) {
   return text;
 }
 
+std::string lower(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
 LineCounter::LineCounter(std::string& text) : text_(text) {
   if (text.find('\\') == std::string::npos) return;
   const auto blank = [&](size_t at) { return text[at] == ' ' || text[at] == '\t'; };

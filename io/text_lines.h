@@ -10,6 +10,9 @@ namespace lumicut::io {
 // UTF-16, which would be read as garbage.
 std::string plain_text(std::string text, const std::string& path);
 
+// ASCII letters alone.
+std::string lower(std::string text);
+
 // Which line of the file a place in its text is in. Quick when places are asked for in rising order.
 class LineCounter {
  public:

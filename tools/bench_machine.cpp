@@ -1,7 +1,6 @@
 #include "tools/bench_machine.h"
 
 #include <sys/utsname.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -9,6 +8,7 @@
 #include <fstream>
 #include <thread>
 
+#include "io/physical_memory.h"
 #include "io/scene_json.h"
 #include "lumicut_git_version.h"
 #include "tools/commands.h"
@@ -27,8 +27,7 @@ ordered_json describe_machine() {
       break;
     }
   machine["threads"] = std::thread::hardware_concurrency();
-  machine["memory_bytes"] =
-      static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<uint64_t>(sysconf(_SC_PAGE_SIZE));
+  machine["memory_bytes"] = io::physical_memory();
   utsname name{};
   uname(&name);
   machine["system"] = std::string(name.sysname) + " " + name.release;

@@ -9,6 +9,7 @@
 #include "io/file_error.h"
 #include "io/image_file.h"
 #include "io/json_reader.h"
+#include "io/text_lines.h"
 #include "tools/commands.h"
 #include "tools/heat_map.h"
 
@@ -23,11 +24,6 @@ struct Options {
   float scale = 32, ignore_above = std::numeric_limits<float>::infinity(), exposure = 0, error_map_top = 0;
 };
 
-std::string lower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
 // The layer of that name, or the only one whose name ends so: "Combined" of "ViewLayer.Combined". "radiance", which other
 // programs do not write, is also their only "Combined", only layer of three components or only layer.
 const io::ImageLayer* find_layer(const io::Image& image, const std::string& name) {
@@ -40,7 +36,8 @@ const io::ImageLayer* find_layer(const io::Image& image, const std::string& name
     return count == 1 ? found : nullptr;
   };
   const auto ending = [&](const std::string& end) {
-    return only([&](const io::ImageLayer& layer) { return lower("." + layer.name).ends_with("." + lower(end)); });
+    return only(
+        [&](const io::ImageLayer& layer) { return io::lower("." + layer.name).ends_with("." + io::lower(end)); });
   };
   if (const auto* found = ending(name)) return found;
   if (name != "radiance") return nullptr;

@@ -1,7 +1,6 @@
 // lumicut render: a scene file to an image, through the C ABI alone.
 #include <fmt/format.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <chrono>
@@ -16,6 +15,7 @@
 #include "io/image_file.h"
 #include "io/json_reader.h"
 #include "io/library.h"
+#include "io/physical_memory.h"
 #include "io/scene_json.h"
 #include "io/scene_upload.h"
 #include "io/vpl_file.h"
@@ -199,22 +199,21 @@ class RenderCommand {
     if (o_.verbosity >= 2) told_ = std::make_unique<io::SceneData>(std::move(data));
   }
 
-  // What would fail after the first pass fails before it: a folder that is not there, no permission, a full disk. As
-  // many bytes are written as each checkpoint takes.
+  // What would fail after the first pass fails before it: a folder that is not there, no permission, a full disk.
   void check_room_for_checkpoint() {
     if (o_.checkpoint.empty()) return;
     uint64_t pixel_bytes = 40;  // of the mean's sums; light groups are not known yet
     for (const auto& channel : choose_channels(api(), "all"))
       pixel_bytes += 4 * static_cast<uint64_t>(channel.components);
-    const uint64_t pixels =
-        crop_.empty() ? uint64_t{desc_.width} * desc_.height : uint64_t{crop_[2] - crop_[0]} * (crop_[3] - crop_[1]);
-    const std::string trial = o_.checkpoint + ".trial";
     try {
-      io::write_whole_file(trial, std::string(pixels * pixel_bytes, '\0'));
+      io::check_writable(o_.checkpoint, pixel_count() * pixel_bytes);
     } catch (const io::FileError& error) {
       throw io::FileError(o_.checkpoint, fmt::format("there is no place for a checkpoint: {}", error.what()));
     }
-    std::filesystem::remove(trial);
+  }
+
+  uint64_t pixel_count() const {
+    return crop_.empty() ? uint64_t{desc_.width} * desc_.height : uint64_t{crop_[2] - crop_[0]} * (crop_[3] - crop_[1]);
   }
 
   // What `lumicut check` says, without its forecast.
@@ -241,13 +240,12 @@ class RenderCommand {
 
   // The library refuses a render beyond the memory; on top come the layers as they are written, and the file's bytes.
   void check_memory(const std::vector<Channel>& channels) const {
-    const double pixels = crop_.empty() ? double{1} * desc_.width * desc_.height
-                                        : double{1} * (crop_[2] - crop_[0]) * (crop_[3] - crop_[1]);
+    const auto pixels = static_cast<double>(pixel_count());
     double components = 3;  // of the PNG
     if (!o_.output.empty())
       for (const Channel& channel : channels) components += 2.0 * channel.components;
     const double bytes = components * sizeof(float) * pixels;
-    const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+    const auto memory = static_cast<double>(io::physical_memory());
     if (bytes > memory)
       throw UsageError(fmt::format("{} of {:.0f} pixels take {:.1f} GB, more than the {:.1f} GB of memory here",
                                    o_.output, pixels, bytes / 1e9, memory / 1e9));
