@@ -27,7 +27,7 @@ std::unique_ptr<unsigned char[]> block(size_t size, const std::vector<unsigned c
   const size_t allocated = std::max<size_t>(size, 4);
   std::unique_ptr<unsigned char[]> p(new unsigned char[allocated]);
   std::memset(p.get(), fill, allocated);
-  std::memcpy(p.get(), content.data(), std::min(content.size(), size));
+  std::copy_n(content.begin(), std::min(content.size(), size), p.get());
   const auto said = static_cast<uint32_t>(size);
   std::memcpy(p.get(), &said, sizeof(said));
   return p;
