@@ -84,11 +84,9 @@ void add_layers(const std::string& path, OIIO::ImageInput& in, int part, Image& 
 }  // namespace
 
 Image read_image(const std::string& path) {
-  check_regular_file(path);
   OIIO::ImageSpec wish;
   wish.attribute("oiio:UnassociatedAlpha", 1);  // colours as they stand in the file
-  const auto in = OIIO::ImageInput::open(path, &wish);
-  if (!in) throw FileError(path, fmt::format("not readable as an image: {}", OIIO::geterror()));
+  const auto in = open_image(path, "an image", &wish);
   Image image;
   for (int part = 0; in->seek_subimage(part, 0); ++part) {
     const OIIO::ImageSpec spec = in->spec();

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <fstream>
 
 #include "io/file_error.h"
 
@@ -22,7 +24,43 @@ bool knows_limit(const std::string& format, const std::string& method) {
   return method == "none" || method == "zip" || method == "lzw" || method == "packbits" || method == "jpeg";
 }
 
+// OpenEXR takes the memory that an attribute's size asks for, up to 2 GB, before it looks for the bytes. Headers are lists
+// of name, type, size, value that an empty name ends; several parts are ended by an empty header.
+// [https://openexr.com/en/latest/OpenEXRFileLayout.html]
+void check_exr_attributes(const std::string& path, const std::string& as) {
+  std::ifstream file(path, std::ios::binary);
+  uint32_t start[2] = {};
+  constexpr uint32_t kMagic = 20000630, kMultiPart = 0x1000;
+  if (!file.read(reinterpret_cast<char*>(start), sizeof(start)) || start[0] != kMagic) return;
+  const auto length = static_cast<int64_t>(std::filesystem::file_size(path));
+  std::string name, type;
+  for (bool first = true;; first = false) {
+    if (!std::getline(file, name, '\0')) return;  // OpenEXR says what is cut short
+    if (name.empty()) {
+      if (first || !(start[1] & kMultiPart)) return;
+      first = true;
+      continue;
+    }
+    int32_t size = 0;
+    if (!std::getline(file, type, '\0') || !file.read(reinterpret_cast<char*>(&size), sizeof(size))) return;
+    const int64_t left = length - static_cast<int64_t>(file.tellg());
+    if (size < 0 || size > left)
+      throw FileError(path, fmt::format("not readable as {}: the header's attribute at byte {} claims {} bytes of {}",
+                                        as, length - left, size, left));
+    file.seekg(size, std::ios::cur);
+  }
+}
+
 }  // namespace
+
+std::unique_ptr<OIIO::ImageInput> open_image(const std::string& path, const std::string& as,
+                                             const OIIO::ImageSpec* wish) {
+  check_regular_file(path);
+  check_exr_attributes(path, as);
+  auto input = OIIO::ImageInput::open(path, wish);
+  if (!input) throw FileError(path, fmt::format("not readable as {}: {}", as, OIIO::geterror()));
+  return input;
+}
 
 void check_image_size(const std::string& path, const OIIO::ImageInput& input) {
   const OIIO::ImageSpec& spec = input.spec();

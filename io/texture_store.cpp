@@ -15,9 +15,7 @@ namespace {
 Texture read_texture(const std::string& path, TextureUse use, uint32_t flags, const std::string& user) {
   std::error_code code;
   if (!std::filesystem::exists(path, code)) throw FileError(path, fmt::format("no such texture, wanted by {}", user));
-  check_regular_file(path);
-  const auto input = OIIO::ImageInput::open(path);
-  if (!input) throw FileError(path, fmt::format("not readable as a texture of {}: {}", user, OIIO::geterror()));
+  const auto input = open_image(path, "a texture of " + user);
   const OIIO::ImageSpec spec = input->spec();
   if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.deep)
     throw FileError(path, fmt::format("a texture of {} x {} x {} pixels cannot be used (by {})", spec.width,

@@ -85,7 +85,7 @@ RenderStats render_in_child(const std::vector<std::string>& arguments, const std
     }
     throw std::runtime_error(text);
   }
-  const auto stats = io::parse_json<ordered_json>(io::read_whole_file(stats_file), stats_file);
+  auto stats = io::parse_json<ordered_json>(io::read_whole_file(stats_file), stats_file);
   std::error_code code;
   fs::remove(stats_file, code);
   return stats;

@@ -30,7 +30,7 @@ using RenderStats = nlohmann::ordered_json;
 RenderStats render_in_child(const std::vector<std::string>& arguments, const std::string& stats_file,
                             const std::function<void()>& waiting);
 
-struct BenchReference {
+struct BenchReference {         // NOLINT(bugprone-exception-escape): nlohmann declares its moves noexcept
   nlohmann::ordered_json info;  // as in the results' "references"
   uint32_t width = 0, height = 0;
   std::vector<float> pixels;  // RGB

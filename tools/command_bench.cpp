@@ -81,7 +81,7 @@ ordered_json job_of(const BenchGroup& group, const BenchRun& run, const std::str
 }
 
 // One run of a method: what `render` said of it, and its distance from the reference.
-struct Trial {
+struct Trial {  // NOLINT(bugprone-exception-escape): nlohmann declares its moves noexcept
   RenderStats stats;
   Metrics metrics;
   double render_seconds() const { return stats["phases"].value("render", 0.0); }
@@ -324,7 +324,7 @@ class BenchCommand {
     arguments.insert(arguments.end(), {"--size", "1x1", "--spp", "1", "-i", "exhaustive", "--vpl-out", lights});
     label_ = "lights of " + group.name(), began_ = now();
     render_in_child(arguments, in_output(".stats.json"), [this] { tick(); });
-    const std::string hash = file_hash(lights);
+    std::string hash = file_hash(lights);
     std::error_code code;
     fs::remove(lights, code);
     return hash;

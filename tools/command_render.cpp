@@ -329,7 +329,7 @@ class RenderCommand {
   }
 
   std::string phase_text(const lumicut_status& status) const {
-    const std::string phase = status.phase ? status.phase : "";
+    std::string phase = status.phase ? status.phase : "";
     if (!progressive()) return phase;
     const std::string error = std::isfinite(status.error) ? fmt::format(", error {:.2g} %", 100 * status.error) : "";
     return status.passes_total > 0

@@ -83,7 +83,8 @@ int run(int argc, char** argv, int& output_error) {
 }  // namespace
 }  // namespace lumicut::tools
 
-int main(int argc, char** argv) {
+// What may still be thrown is want of memory for the last words.
+int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   lumicut::io::open_standard_streams();
   int output_error = 0;
   const int code = lumicut::tools::run(argc, argv, output_error);

@@ -16,7 +16,7 @@ struct Suspicion {
   std::string kind, text;
 };
 
-struct Preflight {
+struct Preflight {                       // NOLINT(bugprone-exception-escape): nlohmann declares its moves noexcept
   nlohmann::ordered_json counts, power;  // power: W of luminance
   double radius = 1;                     // half the diagonal of the scene's bounds
   double clamp = 0;                      // no light is taken to be nearer

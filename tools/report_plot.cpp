@@ -30,7 +30,7 @@ struct Axis {
   double at(double value) const { return from + (to - from) * std::log(value / low) / std::log(high / low); }
 };
 
-Axis axis_of(std::vector<float> values, double from, double to) {
+Axis axis_of(const std::vector<float>& values, double from, double to) {
   const auto range = decade_range(values);
   return {range[0], range[1], from, to};
 }

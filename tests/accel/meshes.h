@@ -39,7 +39,8 @@ inline Mesh random_soup(size_t n, float size, uint64_t seed) {
   Mesh mesh;
   for (size_t i = 0; i < n; ++i) {
     const Vec3f c = random_point(rng);
-    mesh.add(c + random_direction(rng) * size, c + random_direction(rng) * size, c + random_direction(rng) * size);
+    const Vec3f a = random_direction(rng) * size, b = random_direction(rng) * size;
+    mesh.add(c + a, c + b, c + random_direction(rng) * size);
   }
   return mesh;
 }
@@ -72,6 +73,13 @@ inline RayHit ray_of(const Vec3f& org, const Vec3f& dir, float tnear = 0.0f,
   RayHit r;
   r.ray.org = org, r.ray.dir = dir, r.ray.tnear = tnear, r.ray.tfar = tfar;
   return r;
+}
+
+// From a cube thrice as wide as the unit cube, in any direction. One draw after another: the order in which arguments are
+// evaluated is the compiler's.
+inline RayHit random_ray(Rng& rng, float tfar = std::numeric_limits<float>::infinity()) {
+  const Vec3f org = random_point(rng) * 3.0f - Vec3f{1, 1, 1};
+  return ray_of(org, random_direction(rng), 0.0f, tfar);
 }
 
 }  // namespace lumicut::test

@@ -200,7 +200,7 @@ TEST(AgglomerativeBvh, HitsEqualEmbreeOnAMillionRaysAScene) {
         Rng rng(begin, Stage::test, robust);
         std::vector<RayHit> a;
         for (size_t i = begin; i < end; ++i) {
-          RayHit r = ray_of(test::random_point(rng) * 3.0f - Vec3f{1, 1, 1}, test::random_direction(rng));
+          RayHit r = test::random_ray(rng);
           if (i % 4 == 1)
             r.ray.dir = Vec3f{}, r.ray.dir[static_cast<int>(i / 4 % 3)] = i % 8 < 4 ? 1.0f : -1.0f;  // axis-parallel
           if (i % 4 == 2) {  // from a surface, with a range
@@ -399,8 +399,8 @@ TEST(AgglomerativeBvh, BoxHitsEqualALoopOverAllBoxes) {
   const auto bvh = Bvh::from_boxes(boxes, {});
   Rng rng(7, Stage::test);
   size_t hits = 0, different = 0;
-  for (int i = 0; i < 5000; ++i) {
-    RayHit r = ray_of(test::random_point(rng) * 3.0f - Vec3f{1, 1, 1}, test::random_direction(rng));
+  for (int i = 0; i < 8000; ++i) {
+    RayHit r = test::random_ray(rng);
     const Vec3f o = r.ray.org, d = r.ray.dir;
     float best = kInf;
     for (const Aabb& b : boxes) {
@@ -460,7 +460,8 @@ TEST(AgglomerativeBvh, ManyInstancesAgreeWithEmbree) {
   const auto ours = make_accel("bvh", geometry, {}), theirs = make_accel("embree", geometry, {});
   size_t different = 0, hits = 0;
   for (int i = 0; i < 50000; ++i) {
-    RayHit r = ray_of(test::random_point(rng) * 20.0f, test::random_direction(rng));
+    const Vec3f org = test::random_point(rng) * 20.0f;
+    RayHit r = ray_of(org, test::random_direction(rng));
     r.ray.mask = 1 + static_cast<uint32_t>(i) % 3;
     RayHit s = r;
     Ray o = r.ray;

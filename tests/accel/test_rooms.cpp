@@ -304,8 +304,7 @@ TEST_P(Rooms, RandomRaysAgreeWithALoopOverAllTriangles) {
       int hits = 0, differ = 0;
       const int n = 2000;
       for (int i = 0; i < n; ++i) {
-        RayHit r = ray_of(test::random_point(rng) * 3.0f - Vec3f{1, 1, 1}, test::random_direction(rng), 0.0f,
-                          i % 3 ? kInf : 0.5f);
+        RayHit r = test::random_ray(rng, i % 3 ? kInf : 0.5f);
         r.ray.mask = static_cast<uint32_t>(i) % 4;
         RayHit expected = r;
         LoopHost::intersect(&truth, &expected, 1);

@@ -1,5 +1,7 @@
 #include "io/image_file.h"
 
+#include <sys/resource.h>
+
 #include <cmath>
 
 #include "tests/io/temporary_folder.h"
@@ -75,6 +77,20 @@ TEST(ImageFile, BrokenImagesAreErrors) {
   for (const size_t length : {size_t{0}, size_t{4}, size_t{100}, whole.size() / 2, whole.size() - 10})
     expect_in(error_of([&] { read_image(folder.write("cut.exr", whole.substr(0, length))); }),
               {"cut.exr", "not readable"});
+}
+
+TEST(ImageFile, AnAttributeLongerThanItsFileIsRefusedBeforeMemoryIsTaken) {
+  const TemporaryFolder folder;
+  write_exr(folder / "a.exr", example(), false);
+  std::string bytes = read_whole_file(folder / "a.exr");
+  const size_t type = bytes.find(std::string("\0string\0", 8));
+  ASSERT_NE(type, std::string::npos);
+  bytes.replace(type + 8, 4, "\x01\x02\x03\x61");  // 1.6 GB
+  rusage before{}, after{};
+  getrusage(RUSAGE_SELF, &before);
+  expect_in(error_of([&] { read_image(folder.write("b.exr", bytes)); }), {"b.exr", "claims 1627587073 bytes"});
+  getrusage(RUSAGE_SELF, &after);
+  EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 100 << 10);  // kB; OpenEXR alone takes all of them
 }
 
 TEST(ImageFile, BytesTurnedOverNeverCrash) {

@@ -90,7 +90,7 @@ TEST(Lifecycle, LeavesNothingBehind) {
               process_status("Threads") - threads, open_files() - files, warm);
   EXPECT_LE(process_status("Threads"), threads);
   EXPECT_LE(open_files(), files);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#ifndef LUMICUT_SANITIZED
   // The allocator's arenas settle at their own pace, but not with the number of lives: a profile that stays is 320 kB.
   EXPECT_LT(grown, 4000 + (lives - warm));
 #endif
@@ -128,7 +128,7 @@ class PeakMemory : public testing::TestWithParam<lumicut_render_desc> {};
 
 // Within a quarter: films and checkpoints are counted, tiles at work and what the allocator rounds up are not.
 TEST_P(PeakMemory, OfARenderIsWhatItsStatisticsSay) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef LUMICUT_SANITIZED
   GTEST_SKIP() << "sanitizers keep memory of their own";
 #endif
   mallopt(M_MMAP_THRESHOLD, 128 << 10);  // what is freed is gone
