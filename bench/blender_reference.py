@@ -1,16 +1,18 @@
 """What the benches in Blender share: long Cycles as the reference, its noise, and CPU seconds of a render."""
+import io
 import os
 import pathlib
 import sys
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT / "tests/blender")]
+sys.path[:0] = [str(ROOT / "tests/blender"), str(ROOT / "export_scripts/scenes")]
 os.environ.setdefault("LUMICUT_SOURCE_DIR", str(ROOT))
 import bpy  # noqa: E402
 import numpy as np  # noqa: E402
 
 import helpers as h  # noqa: E402
+import whole_file  # noqa: E402
 
 
 def measured(configure):
@@ -60,5 +62,7 @@ def render_parts(folder, parts, samples):
         if path.exists():
             continue
         image, cpu, wall = measured(lambda: cycles(samples, 100 + part))
-        np.save(path, image)
+        stream = io.BytesIO()
+        np.save(stream, image)
+        whole_file.write(path, stream.getvalue())
         print(f"part {part}: {cpu:.0f} CPU s, {wall:.0f} s", flush=True)

@@ -2,6 +2,10 @@
 import html
 import math
 import pathlib
+import sys
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "export_scripts/scenes"))
+import whole_file  # noqa: E402
 
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 640, 400, 64, 20, 34, 50
 COLOURS = ("#1b6ca8", "#c0392b", "#2e8b57", "#8e44ad", "#b9770e")
@@ -60,4 +64,4 @@ def write(path, title, x_label, y_label, series, percent=True, slope=None):
         y = TOP + 18 + 18 * i
         out.append(f'<path transform="translate({WIDTH - RIGHT - 12},{y - 4})" d="{marker}" fill="{colour}"/>'
                    f'<text x="{WIDTH - RIGHT - 22}" y="{y}" text-anchor="end">{html.escape(name)}</text>')
-    pathlib.Path(path).write_text("\n".join(out) + "\n</svg>\n")
+    whole_file.write(path, "\n".join(out) + "\n</svg>\n")

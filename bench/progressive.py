@@ -22,6 +22,9 @@ import OpenImageIO as oiio
 import loglog_plot
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
+sys.path.append(str(ROOT / "export_scripts/scenes"))
+import whole_file  # noqa: E402
+
 CELLS = 4  # a side: sixteen parts
 
 
@@ -87,7 +90,7 @@ def curve(options):
         rmse, mean, worst = t.row(load(path))
         points.append((passes, rmse))
         print(f"| {passes} | {100 * rmse:.1f} % | {100 * mean:+.2f} % | {100 * worst:.1f} % |", flush=True)
-    (options.folder / f"{options.name}.curve.json").write_text(json.dumps(points))
+    whole_file.write(options.folder / f"{options.name}.curve.json", json.dumps(points))
 
 
 def plot(options):

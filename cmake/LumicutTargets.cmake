@@ -77,6 +77,7 @@ function(lumicut_test name)
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE lumicut_options ${ARG_LINK} GTest::gtest GTest::gtest_main)
   if(LUMICUT_SANITIZE)
+    target_compile_definitions(${name} PRIVATE LUMICUT_SANITIZED)
     target_compile_options(${name} PRIVATE -O0)  # what is tested is optimised; GoogleTest's macros take the compiler long
   endif()
   add_test(NAME ${name} COMMAND ${name})

@@ -4,6 +4,8 @@ import math
 import pathlib
 import struct
 
+import whole_file
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
@@ -42,17 +44,16 @@ class Obj:
 
     def write(self, path, materials):
         """`materials`: name -> (Kd, Ks, Ns)."""
-        path.parent.mkdir(parents=True, exist_ok=True)
         lines = [f"# Made by export_scripts/scenes/{path.stem}.py; metres, y up", f"mtllib {path.stem}.mtl"]
         lines += ["v " + " ".join(f"{x:.5g}" for x in v) for v in self.vertices]
         for material, faces in self.faces.items():
             lines.append(f"usemtl {material}")
             lines += ["f " + " ".join(map(str, face)) for face in faces]
-        path.write_text("\n".join(lines) + "\n")
+        whole_file.write(path, "\n".join(lines) + "\n")
         text = [f"# Made by export_scripts/scenes/{path.stem}.py"]
         for name, (kd, ks, ns) in materials.items():
             text += ["", f"newmtl {name}", "Kd " + " ".join(map(str, kd)), "Ks " + " ".join(map(str, ks)), f"Ns {ns}", "illum 2"]
-        path.with_suffix(".mtl").write_text("\n".join(text) + "\n")
+        whole_file.write(path.with_suffix(".mtl"), "\n".join(text) + "\n")
 
 
 def write_scene(path, scene):
@@ -70,8 +71,7 @@ def write_scene(path, scene):
     def simple(value):
         return not isinstance(value, (dict, list)) or isinstance(value, list) and all(not isinstance(v, (dict, list)) for v in value)
 
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text(scene, 0) + "\n")
+    whole_file.write(path, text(scene, 0) + "\n")
 
 
 def write_exr(path, width, height, pixel):
@@ -96,5 +96,4 @@ def write_exr(path, width, height, pixel):
         row = [pixel(x, y) for x in range(width)]
         planes = [c[k] for k in (2, 1, 0) for c in row]
         body += struct.pack("<ii", y, line_bytes) + struct.pack(f"<{len(planes)}e", *planes)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(header + offsets + body)
+    whole_file.write(path, header + offsets + body)

@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "tests/accel/meshes.h"
+#include "tests/support/trimmed.h"
 
 namespace lumicut {
 namespace {
@@ -85,7 +86,7 @@ TEST(BvhBuild, EveryBuilderHoldsEachPrimitiveOnceInTightBoxes) {
 }
 
 TEST(BvhBuild, TreesDoNotDependOnTheNumberOfThreads) {
-  const auto boxes = boxes_of(test::random_soup(30000, 0.03f, 2));
+  const auto boxes = boxes_of(test::random_soup(test::trimmed(30000), 0.03f, 2));
   for (const char* name : kBuilders) {
     Tree trees[2];
     for (int i = 0; i < 2; ++i)
@@ -194,7 +195,8 @@ TEST(AgglomerativeBvh, HitsEqualEmbreeOnAMillionRaysAScene) {
       const AccelGeometry geometry{{mesh.view()}, {}, nullptr};
       const auto ours = make_accel("bvh", geometry, options), theirs = make_accel("embree", geometry, options);
       // A million a scene, in both modes; fewer where each instruction set takes its turn.
-      const size_t kRays = std::getenv("LUMICUT_TEST_INSTRUCTION_SET") == nullptr ? 500000 : 50000, kChunk = 5000;
+      const size_t kRays = std::getenv("LUMICUT_TEST_INSTRUCTION_SET") == nullptr ? test::trimmed(500000) : 50000,
+                   kChunk = 5000;
       std::atomic<size_t> different{0}, hits{0}, occlusion_different{0};
       parallel_chunks(kRays, kChunk, [&](size_t begin, size_t end) {
         Rng rng(begin, Stage::test, robust);
@@ -323,7 +325,7 @@ TEST(AgglomerativeBvh, BundlesAnswerAsSingleRaysDo) {
 TEST(AgglomerativeBvh, AMillionCoincidentTrianglesBuildAndAreHit) {
   Mesh mesh;
   for (int i = 0; i < 3; ++i) mesh.positions.push_back({i == 1 ? 1.0f : 0.0f, i == 2 ? 1.0f : 0.0f, 1.0f});
-  for (int i = 0; i < 1000000; ++i) mesh.indices.insert(mesh.indices.end(), {0, 1, 2});
+  for (size_t i = 0; i < test::trimmed(1000000); ++i) mesh.indices.insert(mesh.indices.end(), {0, 1, 2});
   const auto accel = make_accel("bvh", {{mesh.view()}, {}, nullptr}, {});
   RayHit r = ray_of({0.2f, 0.2f, 0}, {0, 0, 1});
   accel->intersect({&r, 1});
