@@ -1,7 +1,6 @@
 #!/usr/bin/env bash
-# Sets up, looks at the sources (format, Python, scripts), builds everything and passes all tests.
-# ./check.sh release|debug|asan|tsan does one build and its tests alone; asan runs the fuzz targets too.
-# ./check.sh tidy: clang-tidy on the library and the tools.
+# Sets up, looks at the sources (format, clang-tidy, Python, scripts), builds everything and passes all tests.
+# ./check.sh release|debug|asan|tsan does one build and its tests alone; asan runs the fuzz targets too, half a minute each.
 set -euo pipefail
 cd "$(dirname "$0")"
 build() {
@@ -13,14 +12,17 @@ step() { printf '\n== %s (%d s)\n' "$1" "$SECONDS"; }
 ./setup.sh
 case ${1-} in
   '') ;;
-  tidy) exec tools/dev/lint.sh --tidy ;;
-  *)
+  release | debug)
     build "$1"
     ctest --preset "$1"
     exit ;;
+  *)
+    build "$1"
+    ctest --preset "$1" --parallel "$(nproc)"
+    exit ;;
 esac
 step lint
-tools/dev/lint.sh
+tools/dev/lint.sh --tidy
 step "build"
 build release
 step "tests"

@@ -368,10 +368,12 @@ void ColumnClusters::sample(size_t count, uint64_t seed, const Progress& progres
     if (starts[k] != starts[k + 1]) append(starts[k], starts[k + 1]);
 }
 
-std::vector<float> race_times(size_t lights, uint64_t seed, uint32_t slot) {
+std::vector<float> race_times(size_t lights, uint64_t seed, uint32_t slot, const Progress* progress) {
   std::vector<float> times(lights);
-  for (size_t l = 0; l < lights; ++l)
+  for (size_t l = 0; l < lights; ++l) {
+    check_now_and_then(progress, l);
     times[l] = -std::log(1.0f - Rng(seed, Stage::representative, l, slot).next_float());
+  }
   return times;
 }
 

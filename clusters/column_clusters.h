@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "clusters/light_matrix.h"
+#include "core/progress.h"
 
 namespace lumicut {
 
@@ -71,7 +72,7 @@ struct ColumnRepresentative {
 };
 
 // Exponential variables of rate 1, one a light, that belong to (seed, slot, light).
-std::vector<float> race_times(size_t lights, uint64_t seed, uint32_t slot);
+std::vector<float> race_times(size_t lights, uint64_t seed, uint32_t slot, const Progress* progress = nullptr);
 
 // Draws a column with probability ‖ρ‖/W: the least of times/‖ρ‖. Clusters that share most of their lights mostly draw
 // the same one, so that neighbouring slices agree. The colour is that of the cluster's sum, the strength W/‖ρ‖.

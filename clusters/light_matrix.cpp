@@ -76,7 +76,7 @@ struct Tile {
 
 }  // namespace
 
-std::vector<Vpl> order_lights(const std::vector<Vpl>& lights) {
+std::vector<Vpl> order_lights(const std::vector<Vpl>& lights, const Progress* progress) {
   Aabb box;
   for (const Vpl& v : lights)
     if (v.kind != VplKind::directional) box.extend(v.position);
@@ -86,6 +86,7 @@ std::vector<Vpl> order_lights(const std::vector<Vpl>& lights) {
   std::vector<Key> keys;
   const Aabb directions{{-1, -1, -1}, {1, 1, 1}};
   for (uint32_t i = 0; i < lights.size(); ++i) {
+    check_now_and_then(progress, i);
     const Vpl& v = lights[i];
     if (!(max_component(v.intensity) > 0.0f)) continue;
     const uint32_t code = v.kind == VplKind::directional ? morton(v.normal, directions) : morton(v.position, box);
@@ -96,6 +97,7 @@ std::vector<Vpl> order_lights(const std::vector<Vpl>& lights) {
   });
   std::vector<Vpl> ordered;
   ordered.reserve(keys.size());
+  check_now_and_then(progress, 0);
   for (const Key& k : keys) ordered.push_back(lights[k.index]);
   return ordered;
 }

@@ -22,7 +22,7 @@ inline float from_bfloat(uint16_t v) { return std::bit_cast<float>(static_cast<u
 
 // The lights that give any light, kind by kind, near ones together (Morton order): rays from one point to lights that
 // follow each other are coherent, and order no longer depends on how the lights were made.
-std::vector<Vpl> order_lights(const std::vector<Vpl>& lights);
+std::vector<Vpl> order_lights(const std::vector<Vpl>& lights, const Progress* progress = nullptr);
 
 class LightMatrix {
  public:

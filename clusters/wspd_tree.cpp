@@ -8,6 +8,7 @@
 
 #include "core/parallel.h"
 #include "core/rng.h"
+#include "vpl/light_profile.h"
 
 namespace lumicut {
 
@@ -504,20 +505,30 @@ WspdTree WspdTree::load(std::span<const uint8_t> bytes) {
   return t;
 }
 
-// All that following an index relies on.
+// All that following an index, choosing a cell and shading rely on.
 void WspdTree::check() const {
   const auto require = [](bool ok, const char* what) {
     if (!ok) fail_argument(std::string("wspd state: ") + what + " make no sense");
   };
   const size_t n = nodes_.size();
-  require(std::isfinite(cube_.side) && cube_.side > 0.0f, "bounds");
+  const auto positive = [](float x) { return std::isfinite(x) && x >= 0.0f; };
+  const auto light = [&](const Vpl& v) {
+    return static_cast<uint32_t>(v.kind) < kVplKinds && is_finite(v.position) && is_finite(v.normal) &&
+           positive(v.intensity.x) && positive(v.intensity.y) && positive(v.intensity.z) &&
+           std::isfinite(v.cos_outer) && std::isfinite(v.blend_cosine) && std::isfinite(v.spot_cosine) &&
+           std::isfinite(v.spread_tan) && (v.profile == 0 || find_profile(v.profile) != nullptr);
+  };
+  require(is_finite(cube_.lower) && positive(cube_.side) && cube_.side > 0.0f, "bounds");
+  for (const double s : cube_.shift) require(s >= 0.0 && s <= 1.0, "bounds");
   require(root_ == WspdNode::kNone ? codes_.empty() : root_ < n && !codes_.empty(), "roots");
   require(codes_.size() == leaf_.size() && codes_.size() <= lights_.size(), "lights");
-  for (const Vpl& v : lights_) require(static_cast<uint32_t>(v.kind) < kVplKinds, "lights");
-  for (const Vpl& v : groups_) require(static_cast<uint32_t>(v.kind) < kVplKinds, "subgroups");
+  for (const Vpl& v : lights_) require(light(v), "lights");
+  for (const Vpl& v : groups_) require(light(v), "subgroups");
   for (uint32_t leaf : leaf_) require(leaf < n, "leaves");
   for (size_t i = 0; i < n; ++i) {
     const WspdNode& node = nodes_[i];
+    require(is_finite(node.center) && positive(node.radius) && positive(node.power) && positive(node.largest_sphere),
+            "nodes");
     require(node.first < node.last && node.last <= lights_.size(), "nodes");
     require(node.child_count <= 8 && uint64_t{node.first_child} + node.child_count <= n, "nodes");
     require(node.leaf() || node.first_child > i, "nodes");  // so that no walk goes round

@@ -37,4 +37,9 @@ class Progress {
   std::atomic<bool> cancelled_{false};
 };
 
+// For loops of short steps: looks at `progress`, where there is one, at step 0 and every 16384 steps on. Throws as check().
+inline void check_now_and_then(const Progress* progress, uint64_t step) {
+  if (progress != nullptr && step % 16384 == 0) progress->check();
+}
+
 }  // namespace lumicut

@@ -10,7 +10,8 @@
 
 namespace lumicut {
 
-BallQueryTree::BallQueryTree(std::span<const double> points, int dimension) : dim_(dimension) {
+BallQueryTree::BallQueryTree(std::span<const double> points, int dimension, const Progress* progress)
+    : dim_(dimension) {
   if (dimension < 1 || dimension > 1024)
     fail_argument("ball tree: dimension is " + std::to_string(dimension) + ", not 1 to 1024");
   const auto d = static_cast<size_t>(dimension);
@@ -23,22 +24,25 @@ BallQueryTree::BallQueryTree(std::span<const double> points, int dimension) : di
   ids_.resize(n);
   std::iota(ids_.begin(), ids_.end(), 0u);
   if (n == 0) return;
-  build(points, 0, n);
+  build(points, 0, n, progress);
   count_ = n;
   coords_.assign(leaves_.size() * kBucket * d, std::numeric_limits<double>::infinity());  // pads are infinitely far
   std::vector<uint32_t> padded(leaves_.size() * kBucket, 0xffffffffu);
-  for (size_t b = 0; b < leaves_.size(); ++b)
+  for (size_t b = 0; b < leaves_.size(); ++b) {
+    check_now_and_then(progress, b);
     for (uint32_t i = leaves_[b].first; i < leaves_[b].second; ++i) {
       const size_t slot = i - leaves_[b].first;
       padded[b * kBucket + slot] = ids_[i];
       for (size_t j = 0; j < d; ++j) coords_[(b * d + j) * kBucket + slot] = points[ids_[i] * d + j];
     }
+  }
   ids_.swap(padded);
   leaves_.clear();
   leaves_.shrink_to_fit();
 }
 
-uint32_t BallQueryTree::build(std::span<const double> points, uint32_t begin, uint32_t end) {
+uint32_t BallQueryTree::build(std::span<const double> points, uint32_t begin, uint32_t end, const Progress* progress) {
+  if (end - begin > 4096) check_now_and_then(progress, 0);
   const auto d = static_cast<size_t>(dim_);
   const auto n = static_cast<uint32_t>(nodes_.size());
   nodes_.push_back({0, 0, 0});
@@ -89,8 +93,8 @@ uint32_t BallQueryTree::build(std::span<const double> points, uint32_t begin, ui
       return x < y || (x == y && i < j);
     });
   }
-  build(points, begin, mid);
-  const uint32_t right = build(points, mid, end);
+  build(points, begin, mid, progress);
+  const uint32_t right = build(points, mid, end, progress);
   nodes_[n].right = right;
   return n;
 }

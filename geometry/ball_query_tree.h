@@ -9,12 +9,14 @@
 #include <utility>
 #include <vector>
 
+#include "core/progress.h"
+
 namespace lumicut {
 
 class BallQueryTree {
  public:
-  // `points`: n rows of `dimension` numbers. Throws invalid_argument as BallTree::build does.
-  BallQueryTree(std::span<const double> points, int dimension);
+  // `points`: n rows of `dimension` numbers. Throws invalid_argument as BallTree::build does, and cancelled.
+  BallQueryTree(std::span<const double> points, int dimension, const Progress* progress = nullptr);
 
   size_t size() const { return count_; }
   // Reusable memory of one thread's queries.
@@ -33,7 +35,7 @@ class BallQueryTree {
     uint32_t right;   // 0: leaf; the left child is the next node
     uint32_t bucket;  // of a leaf
   };
-  uint32_t build(std::span<const double> points, uint32_t begin, uint32_t end);
+  uint32_t build(std::span<const double> points, uint32_t begin, uint32_t end, const Progress* progress);
 
   int dim_;
   size_t count_ = 0;

@@ -6,13 +6,13 @@
 
 namespace lumicut {
 
-EyeRays::EyeRays(const Scene& scene, float distance, bool spheres, uint64_t seed)
+EyeRays::EyeRays(const Scene& scene, float distance, bool spheres, uint64_t seed, const Progress& progress)
     : scene_(scene),
       distance_(distance),
       spheres_(spheres),
       seed_(seed),
-      emitters_(scene),
-      lamps_(scene, emitters_, distance),
+      emitters_(scene, &progress),
+      lamps_(scene, emitters_, distance, progress),
       lamp_surfaces_(scene) {}
 
 void EyeRays::near_lamps(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, EyeHits& hits) const {

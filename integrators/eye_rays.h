@@ -16,8 +16,8 @@ namespace lumicut {
 class EyeRays {
  public:
   // `distance`: that of the clamp, above 0. `spheres`: virtual lights on surfaces are, and lose nothing by it. Scene
-  // outlives this.
-  EyeRays(const Scene& scene, float distance, bool spheres, uint64_t seed);
+  // outlives this. Throws Error(cancelled).
+  EyeRays(const Scene& scene, float distance, bool spheres, uint64_t seed, const Progress& progress);
 
   // One ray from each point (unless it is cut short by chance, or the point is black), one sample of each near lamp,
   // and one of all emissive meshes. `level` counts the surfaces since the camera. Deterministic: numbers belong to the places of points.

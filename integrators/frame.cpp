@@ -335,7 +335,8 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
   if (std::any_of(scene.materials().begin(), scene.materials().end(), [](const Material& m) { return m.followed(); }))
     lamps.emplace(scene);
   std::optional<EyeRays> eye_rays;
-  if (options.compensate > 0.0f) eye_rays.emplace(scene, options.compensate, options.spheres, options.seed);
+  if (options.compensate > 0.0f)
+    eye_rays.emplace(scene, options.compensate, options.spheres, options.seed, context.progress);
   context.progress.begin("render", size_t{options.crop.width()} * options.crop.height());
   tbb::parallel_for(
       tbb::blocked_range<size_t>(0, batches.size(), 1),

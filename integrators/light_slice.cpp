@@ -52,16 +52,16 @@ class SharedTimer {
 
 class LightSlice final : public Integrator {
  public:
-  void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext) override {
+  void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
     const float clamp = clamp_distance(params, scene);
     clamp2_ = clamp * clamp;
     slices_ = static_cast<size_t>(params.integer("slices"));
     columns_ = static_cast<size_t>(params.integer("columns"));
-    lights_ = order_lights(vpls.lights);
+    lights_ = order_lights(vpls.lights, &context.progress);
     times_.clear();
     for (uint32_t s = 0; s < params.integer("representatives"); ++s)
-      times_.push_back(race_times(lights_.size(), static_cast<uint64_t>(params.integer("seed")), s));
+      times_.push_back(race_times(lights_.size(), static_cast<uint64_t>(params.integer("seed")), s, &context.progress));
   }
 
   size_t batch_size() const override { return kBatch; }

@@ -27,9 +27,10 @@ Aabb bounds_of(const Light& l) {
 
 }  // namespace
 
-NearLamps::NearLamps(const Scene& scene, const Emitters& emitters, float distance)
+NearLamps::NearLamps(const Scene& scene, const Emitters& emitters, float distance, const Progress& progress)
     : scene_(scene), emitters_(emitters), distance_(distance) {
   for (uint32_t i = 0; i < scene.lights().size(); ++i) {
+    if (i % 64 == 0) progress.check();  // thousands of cells each
     const Light& light = scene.lights()[i];
     if (light.type == LightType::sun || !(max_component(light.value) > 0.0f)) continue;
     const auto index = static_cast<uint32_t>(lamps_.size());

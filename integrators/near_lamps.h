@@ -5,6 +5,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "core/progress.h"
 #include "scene/shade_points.h"
 #include "vpl/emitters.h"
 
@@ -12,8 +13,8 @@ namespace lumicut {
 
 class NearLamps {
  public:
-  // `distance`: that of the clamp, above 0.
-  NearLamps(const Scene& scene, const Emitters& emitters, float distance);
+  // `distance`: that of the clamp, above 0. Throws Error(cancelled).
+  NearLamps(const Scene& scene, const Emitters& emitters, float distance, const Progress& progress);
   bool empty() const { return lamps_.empty(); }
 
   // What one sample of each near lamp gives the point beyond its clamped light, before visibility: fn(vpl, radiance).

@@ -20,9 +20,9 @@ constexpr uint32_t kSureBounces = 3;  // before chance may end a path
 
 class PathTracer final : public Integrator {
  public:
-  void prepare(const Scene& scene, const VplSet&, const Params& params, ShadeContext) override {
+  void prepare(const Scene& scene, const VplSet&, const Params& params, ShadeContext context) override {
     scene_ = &scene;
-    emitters_ = std::make_unique<Emitters>(scene);
+    emitters_ = std::make_unique<Emitters>(scene, &context.progress);
     lamps_ = std::make_unique<LampSurfaces>(scene);
     samples_ = static_cast<uint32_t>(params.integer("samples"));
     max_depth_ = static_cast<uint32_t>(params.integer("max_depth"));

@@ -18,7 +18,7 @@ constexpr float kShadowedShare = 0.07f;
 
 class RowColumnSampling final : public Integrator {
  public:
-  void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext) override {
+  void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
     const float clamp = clamp_distance(params, scene);
     clamp2_ = clamp * clamp;
@@ -26,8 +26,8 @@ class RowColumnSampling final : public Integrator {
     columns_ = static_cast<size_t>(params.integer("columns"));
     sampled_ = params.real("sampled");
     seed_ = static_cast<uint64_t>(params.integer("seed"));
-    lights_ = order_lights(vpls.lights);
-    times_ = race_times(lights_.size(), seed_, 0);
+    lights_ = order_lights(vpls.lights, &context.progress);
+    times_ = race_times(lights_.size(), seed_, 0, &context.progress);
   }
 
   size_t batch_size() const override { return 262144; }

@@ -111,12 +111,12 @@ size_t DiscreteDistribution::sample(double u, size_t first, size_t last, double&
   return i;
 }
 
-void Emitters::add_lamps(std::vector<double>& weights) {
+void Emitters::add_lamps(std::vector<double>& weights, const Progress* progress) {
   const double world_area = std::numbers::pi * scene_.radius() * scene_.radius();
   // Those that a VPL each stands for first, then the environment, then those with extent.
   for (const bool extended : {false, true}) {
     if (extended) {
-      const double power = environment_power();
+      const double power = environment_power(progress);
       if (power > 0.0) emitters_.push_back({Kind::environment, 0, 0, 0}), weights.push_back(power);
       environment_share_ = power;  // until the others' power is known
       extended_ = emitters_.size();
@@ -127,6 +127,7 @@ void Emitters::add_lamps(std::vector<double>& weights) {
       weights.push_back(power);
     };
     for (uint32_t i = 0; i < scene_.lights().size(); ++i) {
+      check_now_and_then(progress, i);
       const Light& l = scene_.lights()[i];
       const double value = luminance(l.value);
       if (!(max_component(l.value) > 0.0f)) continue;
@@ -168,7 +169,7 @@ void Emitters::add_lamps(std::vector<double>& weights) {
   }
 }
 
-double Emitters::environment_power() {
+double Emitters::environment_power(const Progress* progress) {
   const Environment& env = scene_.environment();
   if (env.black()) return 0.0;
   double integral = 4 * std::numbers::pi * luminance(env.color);
@@ -176,6 +177,7 @@ double Emitters::environment_power() {
     const Texture& t = scene_.textures()[env.texture];
     std::vector<double> weights(size_t{t.width()} * t.height());
     for (uint32_t y = 0; y < t.height(); ++y) {
+      check_now_and_then(progress, 0);
       const double sine = std::sin(std::numbers::pi * (y + 0.5) / t.height());
       for (uint32_t x = 0; x < t.width(); ++x) {
         // The largest of the texel and its neighbours: bilinear filtering spreads light to texels that are black.
@@ -196,13 +198,15 @@ double Emitters::environment_power() {
   return std::numbers::pi * scene_.radius() * scene_.radius() * integral;
 }
 
-void Emitters::add_triangles(std::vector<double>& weights) {
+void Emitters::add_triangles(std::vector<double>& weights, const Progress* progress) {
   const auto& materials = scene_.materials();
   size_t count = 0;
   for (uint32_t m = 0; m < scene_.meshes().size(); ++m) {
     const Mesh& mesh = scene_.meshes()[m];
-    for (uint32_t t = 0; t < mesh.triangle_count(); ++t)
+    for (uint32_t t = 0; t < mesh.triangle_count(); ++t) {
+      check_now_and_then(progress, t);
       if (materials[mesh.material_of(t)].emissive()) count += scene_.instance_count(m);
+    }
   }
   if (count == 0) return;
   has_meshes_ = true;
@@ -223,9 +227,11 @@ void Emitters::add_triangles(std::vector<double>& weights) {
                                   mesh.triangle_materials.end();
       if (!used) continue;
       if (!integral)
-        integral = std::make_unique<TextureIntegral>(scene_.textures()[material.emission_texture], material.emission);
+        integral = std::make_unique<TextureIntegral>(scene_.textures()[material.emission_texture], material.emission,
+                                                     progress);
       textured_[m].resize(mesh.triangle_count());
       parallel_chunks(mesh.triangle_count(), 1024, [&](size_t begin, size_t end) {
+        check_now_and_then(progress, 0);
         for (size_t t = begin; t < end; ++t) {
           if (mesh.material_of(static_cast<uint32_t>(t)) != id) continue;
           const uint32_t* v = &mesh.indices[3 * t];
@@ -244,6 +250,7 @@ void Emitters::add_triangles(std::vector<double>& weights) {
       if (!material.emissive()) continue;
       const double emission = material.emission_texture >= 0 ? textured_[m][t] : luminance(material.emission);
       for (uint32_t i = 0; i < scene_.instance_count(m); ++i) {
+        check_now_and_then(progress, emitters_.size());
         const Transform& to_world = scene_.instance(m, i);
         const uint32_t* index = &mesh.indices[3 * size_t{t}];
         const Vec3f a = to_world.point(mesh.positions[index[0]]), b = to_world.point(mesh.positions[index[1]]),
@@ -258,10 +265,10 @@ void Emitters::add_triangles(std::vector<double>& weights) {
   }
 }
 
-Emitters::Emitters(const Scene& scene) : scene_(scene) {
+Emitters::Emitters(const Scene& scene, const Progress* progress) : scene_(scene) {
   std::vector<double> weights;
-  add_lamps(weights);
-  add_triangles(weights);
+  add_lamps(weights, progress);
+  add_triangles(weights, progress);
   power_ = DiscreteDistribution(weights);
   const double with_extent = has_extended() ? power_.sum(extended_, emitters_.size()) : 0.0;
   if (environment_share_ > 0.0) environment_share_ /= environment_share_ + with_extent;

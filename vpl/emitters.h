@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "core/progress.h"
 #include "core/rng.h"
 #include "scene/scene.h"
 #include "vpl/vpl.h"
@@ -50,7 +51,8 @@ Rgb lamp_radiance(const Light& light, float cosine);
 
 class Emitters {
  public:
-  explicit Emitters(const Scene& scene);
+  // Throws Error(cancelled) where `progress` is.
+  explicit Emitters(const Scene& scene, const Progress* progress = nullptr);
   bool empty() const { return power_.empty(); }
 
   // Lamps without extent: one VPL each, exactly.
@@ -95,9 +97,9 @@ class Emitters {
     float area_pdf;
   };
 
-  void add_lamps(std::vector<double>& weights);
-  double environment_power();
-  void add_triangles(std::vector<double>& weights);
+  void add_lamps(std::vector<double>& weights, const Progress* progress);
+  double environment_power(const Progress* progress);
+  void add_triangles(std::vector<double>& weights, const Progress* progress);
   Surface sample_surface(const Emitter& e, Rng& rng) const;
   // A sample of an emitter with extent as a virtual light that stands for `weight` of it; a sun's has no area_pdf: 0.
   Vpl extended_light(const Emitter& e, float weight, Rng& rng, float& area_pdf) const;

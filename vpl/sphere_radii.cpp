@@ -13,7 +13,7 @@ void make_spheres(std::span<Vpl> lights, float scale, float scene_radius, const 
   std::vector<double> places(3 * lights.size());
   for (size_t i = 0; i < lights.size(); ++i)
     for (int k = 0; k < 3; ++k) places[3 * i + static_cast<size_t>(k)] = static_cast<double>(lights[i].position[k]);
-  const BallQueryTree tree(places, 3);
+  const BallQueryTree tree(places, 3, progress);
   parallel_chunks(lights.size(), 1024, [&](size_t begin, size_t end) {
     if (progress != nullptr) progress->check();
     BallQueryTree::Scratch scratch;

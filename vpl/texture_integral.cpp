@@ -10,13 +10,14 @@ constexpr double kMostTexels = 1 << 24;
 constexpr double kMostCrossings = 1 << 20;
 }  // namespace
 
-TextureIntegral::TextureIntegral(const Texture& texture, const Rgb& factor)
+TextureIntegral::TextureIntegral(const Texture& texture, const Rgb& factor, const Progress* progress)
     : clamp_(texture.clamped()), nearest_(texture.nearest()) {
   uint32_t box = 1;
   while (double{1} * texture.width() * texture.height() / (double{1} * box * box) > kMostTexels) ++box;
   width_ = (texture.width() + box - 1) / box, height_ = (texture.height() + box - 1) / box;
   values_.assign(static_cast<size_t>(width_ * height_), 0.0f);
-  for (int64_t y = 0; y < height_; ++y)
+  for (int64_t y = 0; y < height_; ++y) {
+    check_now_and_then(progress, 0);
     for (int64_t x = 0; x < width_; ++x) {
       const auto x0 = static_cast<uint32_t>(x * box), y0 = static_cast<uint32_t>(y * box);
       const uint32_t x1 = std::min(texture.width(), x0 + box), y1 = std::min(texture.height(), y0 + box);
@@ -25,6 +26,7 @@ TextureIntegral::TextureIntegral(const Texture& texture, const Rgb& factor)
         for (uint32_t i = x0; i < x1; ++i) sum += luminance(factor * texture.texel(i, j));
       values_[static_cast<size_t>(y * width_ + x)] = static_cast<float>(sum / ((x1 - x0) * double{1} * (y1 - y0)));
     }
+  }
   sums_.resize(static_cast<size_t>((width_ + 1) * height_));
   for (int64_t y = 0; y < height_; ++y) {
     double* row = &sums_[static_cast<size_t>(y * (width_ + 1))];

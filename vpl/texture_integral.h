@@ -7,6 +7,7 @@
 
 #include <vector>
 
+#include "core/progress.h"
 #include "scene/texture.h"
 
 namespace lumicut {
@@ -14,7 +15,7 @@ namespace lumicut {
 class TextureIntegral {
  public:
   // Of the luminance of factor · texture.
-  TextureIntegral(const Texture& texture, const Rgb& factor);
+  TextureIntegral(const Texture& texture, const Rgb& factor, const Progress* progress = nullptr);
   // Mean over the triangle of texture coordinates, not below 0; over a segment or point where it is flat.
   double mean(Vec2f a, Vec2f b, Vec2f c) const;
 

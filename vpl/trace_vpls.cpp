@@ -189,7 +189,7 @@ void trace_indirect(const Scene& scene, const Emitters& emitters, const VplOptio
 VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progress) {
   progress.begin("light paths", options.count);
   VplSet set;
-  const Emitters emitters(scene);
+  const Emitters emitters(scene, &progress);
   if (emitters.empty()) return set;
   set.lights = emitters.delta_lights();
   const uint64_t budget = options.count > set.lights.size() ? options.count - set.lights.size() : 0;

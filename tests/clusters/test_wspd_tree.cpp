@@ -224,6 +224,19 @@ TEST(WspdTree, SavedTreesComeBackAndDamageIsFound) {
   }
 }
 
+TEST(WspdTree, NumbersThatAreNoneAreRefused) {
+  std::vector<uint8_t> bytes;
+  build(mixed_lights(50)).save(bytes);
+  // The cube's corner, side and shift come first: by them a place chooses its cell.
+  constexpr size_t kCube = 5 * sizeof(double);
+  for (size_t at = 0; at < kCube; at += sizeof(float)) {
+    std::vector<uint8_t> bad = bytes;
+    bad[at + 2] = 0xff, bad[at + 3] = 0x7f;  // little-endian NaN, of a float and in a double's upper half
+    if (at >= 2 * sizeof(double) && at % sizeof(double) == 0) continue;  // a double's lower half
+    EXPECT_THROW(WspdTree::load(bad), Error) << at;
+  }
+}
+
 TEST(WspdTree, DegenerateLightsAreNoTrouble) {
   EXPECT_EQ(build({}).root(), WspdNode::kNone);
   std::vector<Vpl> dark(10);
