@@ -34,13 +34,15 @@ void check_exr_attributes(const std::string& path, const std::string& as) {
   if (!file.read(reinterpret_cast<char*>(start), sizeof(start)) || start[0] != kMagic) return;
   const auto length = static_cast<int64_t>(std::filesystem::file_size(path));
   std::string name, type;
-  for (bool first = true;; first = false) {
+  bool empty = true;  // the header, so far
+  for (;;) {
     if (!std::getline(file, name, '\0')) return;  // OpenEXR says what is cut short
     if (name.empty()) {
-      if (first || !(start[1] & kMultiPart)) return;
-      first = true;
+      if (empty || !(start[1] & kMultiPart)) return;
+      empty = true;
       continue;
     }
+    empty = false;
     int32_t size = 0;
     if (!std::getline(file, type, '\0') || !file.read(reinterpret_cast<char*>(&size), sizeof(size))) return;
     const int64_t left = length - static_cast<int64_t>(file.tellg());

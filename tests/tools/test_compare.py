@@ -24,6 +24,18 @@ def png(pixels, width, height, channels):
             + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
 
 
+def tiff(pixels, width, height):
+    """RGB of 32-bit floats, uncompressed, in one strip."""
+    entries = [(256, 4, 1, width), (257, 4, 1, height), (258, 3, 3, 10), (259, 3, 1, 1), (262, 3, 1, 2), (273, 4, 1, 16), (277, 3, 1, 3),
+               (278, 4, 1, height), (279, 4, 1, 4 * len(pixels)), (284, 3, 1, 1), (339, 3, 3, 0)]
+    data = struct.pack(f"<{len(pixels)}f", *pixels)
+    arrays = 16 + len(data)  # three bits a sample, then three formats
+    values = {258: arrays, 339: arrays + 6}
+    folder = struct.pack("<H", len(entries)) + b"".join(
+        struct.pack("<HHI", tag, kind, count) + struct.pack("<I", values.get(tag, value)) for tag, kind, count, value in entries)
+    return (b"II*\0" + struct.pack("<I", arrays + 12) + bytes(8) + data + struct.pack("<6H", 32, 32, 32, 3, 3, 3) + folder + bytes(4))
+
+
 def exr(parts, width, height):
     """Uncompressed, of 32-bit floats: a list of (part's name, {channel: values})."""
     several = len(parts) > 1
@@ -126,6 +138,11 @@ class Compare(Base):
         flat = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 3 +X 4\n" + bytes([128, 64, 32, 129]) * 12
         same = self.file("same.exr", exr([("", {c: [v / 128] * 12 for c, v in (("R", 128), ("G", 64), ("B", 32))})], W, H))
         self.assertLess(self.measures(self.file("flat.hdr", flat), reference=same)["max_relative_error"], 0.01)
+
+    def test_a_tiff_of_floats_keeps_its_values(self):
+        values = [0.01 * i * i for i in range(36)]
+        same = self.file("same.exr", exr([("", {"R": values[0::3], "G": values[1::3], "B": values[2::3]})], W, H))
+        self.assertEqual(self.measures(self.file("floats.tif", tiff(values, W, H)), reference=same)["rmse"], 0)
 
     @unittest.skipUnless(np, "this Python has no numpy")
     def test_flip_and_hdr_flip_are_what_the_papers_define(self):

@@ -30,7 +30,7 @@ class Ordered {
         char* after;
         ~Left() { __tsan_release(after); }
       } const left{&after_};
-      fn(std::forward<decltype(arguments)>(arguments)...);
+      return fn(std::forward<decltype(arguments)>(arguments)...);
     };
   }
 
