@@ -1,0 +1,118 @@
+// Images to the last bit: what changes the code and not the picture is held to that here. A change that is meant to change
+// images says so and puts the hashes that this test prints in the place of these.
+//
+// Hashes are those of GCC's optimised code on processors with AVX2 or AVX-512 and our own BVH: with fewer instructions, with another
+// compiler or on Embree images round otherwise (docs/progressive.md); there the test is skipped. They tell that an image
+// is another, not which is right: that is what all the other tests are for.
+#include <cstring>
+#include <functional>
+
+#include "full_host.h"
+#include "hwy/highway.h"
+
+namespace {
+
+using namespace box;
+
+struct Golden {
+  const char* name;
+  std::function<void(Host&)> change;
+  uint64_t hash;
+};
+
+void PrintTo(const Golden& golden, std::ostream* out) { *out << golden.name; }
+
+std::function<void(Host&)> by(const char* integrator, std::map<std::string, std::string> parameters = {},
+                              const std::function<void(Host&)>& change = {}) {
+  return [=](Host& h) {
+    h.integrator = integrator;
+    for (const auto& [name, value] : parameters) h.parameters[name] = value;
+    if (change) change(h);
+  };
+}
+
+void glass(Host& h) {
+  h.materials[4].transmission = 0.8f, h.materials[4].ior = 1.45f, h.materials[4].metallic = 0;
+  h.materials[4].roughness = 0, h.materials[4].coat = 0;
+}
+
+void rough_glass(Host& h) {
+  glass(h);
+  h.materials[4].roughness = 0.5f;
+}
+
+void mirror(Host& h) { h.materials[4].metallic = 1, h.materials[4].roughness = 0.02f, h.materials[4].coat = 0; }
+
+void phong(Host& h) {
+  h.materials[4].flags = 0, h.materials[4].shininess = 40, h.materials[4].specular[1] = 0.3f;
+  h.materials[4].metallic = h.materials[4].coat = h.materials[4].coat_roughness = h.materials[4].roughness = 0;
+}
+
+const Golden kGolden[] = {
+    {"exhaustive", by("exhaustive"), 0x4d4712d3ad14da40},
+    {"lightcuts", by("lightcuts", {{"error", "0.1"}}), 0xa4b52c5747b3c536},
+    {"multidimensional", by("multidimensional_lightcuts", {{"error", "0.1"}}), 0xb2ee1b8ebde0971b},
+    {"light_slice", by("light_slice", {{"columns", "40"}}), 0x9ebe87683d71701b},
+    {"row_column_sampling", by("row_column_sampling", {{"columns", "40"}}), 0xc65dad9ff66614db},
+    {"stochastic_lightcuts", by("stochastic_lightcuts"), 0xc7c871669f4904db},
+    {"wspd", by("wspd"), 0xccb3e1fa4620dad6},
+    {"illumination_cut", by("illumination_cut"), 0xe11a259f0b73979a},
+    {"illumination_cut_unbiased", by("illumination_cut", {{"visibility", "unbiased"}}), 0xaf9695d0edd57011},
+    {"path_tracer", by("path_tracer", {{"samples", "8"}}), 0x6621990d3526ca9f},
+    {"compensated", by("lightcuts", {{"compensate", "true"}}), 0xf2cb7fc4eb232c63},
+    {"compensated_exhaustive", by("exhaustive", {{"compensate", "true"}}), 0x51cad86e50095b38},
+    {"spheres", by("exhaustive", {{"virtual_lights", "spheres"}}), 0xd6deedecee339980},
+    {"spheres_lightcuts", by("lightcuts", {{"virtual_lights", "spheres"}, {"compensate", "true"}}), 0x1e99ddd83a7a9b01},
+    {"glass", by("lightcuts", {{"compensate", "true"}}, glass), 0xf58002e85a921046},
+    {"glass_path_tracer", by("path_tracer", {{"samples", "8"}}, glass), 0xaf20b3b202dc9059},
+    {"rough_glass", by("exhaustive", {{"compensate", "true"}}, rough_glass), 0xc8515ada818cd37a},
+    {"mirror", by("lightcuts", {{"compensate", "true"}}, mirror), 0xce06daefdf9f1137},
+    {"mirror_path_tracer", by("path_tracer", {{"samples", "8"}}, mirror), 0x2ac99de455090f6a},
+    {"phong", by("lightcuts", {{"compensate", "true"}}, phong), 0xae409ee1c5ba75a7},
+    {"phong_path_tracer", by("path_tracer", {{"samples", "8"}}, phong), 0x954ff90a921d679d},
+    {"groups",
+     by("lightcuts", {{"compensate", "true"}}, [](Host& h) { h.lights[1].group = 3, h.frame.flags = LUMICUT_GROUPS; }),
+     0xcf5107288bcfa533},
+    {"host_lights", by("exhaustive", {}, [](Host& h) { h.host_lights = true; }), 0x36e73f4f2ff9626b},
+    {"lens_and_samples",
+     by("exhaustive", {},
+        [](Host& h) {
+          h.camera.lens_radius = 0.05f, h.camera.focus_distance = 2;
+          h.frame.samples = 3, h.frame.passes = 1, h.frame.flags = LUMICUT_ILLUMINANCE;
+        }),
+     0xefea34244e2aa02},
+};
+
+class GoldenImages : public testing::TestWithParam<Golden> {};
+
+TEST_P(GoldenImages, AreUnchanged) {
+#if defined(__clang__) || !defined(__OPTIMIZE__)
+  GTEST_SKIP() << "the code of another compiler, or of none that optimises, rounds otherwise";
+#endif
+  const int64_t targets = hwy::SupportedTargets() & HWY_TARGETS;
+  if ((targets & -targets) > HWY_AVX2) GTEST_SKIP() << "this processor has no fused multiply-adds";
+  const api::Device device(2);
+  Host host;
+  host.accel = "bvh";
+  host.parameters["vpls"] = "200";
+  host.frame.width = 32, host.frame.height = 24;
+  GetParam().change(host);
+  const api::Render r(host.method(device), host.scene(device), host.frame);
+  r.wait();
+  uint64_t hash = 14695981039346656037u;  // FNV-1a
+  for (uint32_t i = 0;; ++i) {
+    auto channel = make<lumicut_channel_info>();
+    if (lumicut_get_channel_info(i, &channel) != LUMICUT_OK) break;
+    for (const float value : r.read(channel.name)) {
+      uint32_t bits = 0;
+      std::memcpy(&bits, &value, sizeof(bits));
+      hash = (hash ^ bits) * 1099511628211u;
+    }
+  }
+  EXPECT_EQ(hash, GetParam().hash) << std::hex << "    0x" << hash << " now, of \"" << GetParam().name << "\"";
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, GoldenImages, testing::ValuesIn(kGolden),
+                         [](const auto& golden) { return std::string(golden.param.name); });
+
+}  // namespace
