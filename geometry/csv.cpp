@@ -14,6 +14,7 @@ void read_rows(std::istream& in, const std::string& name, const char* const (&fi
   std::string line;
   for (size_t number = 1, rows = 0; std::getline(in, line); ++number) {
     const char *at = line.data(), *end = at + line.size();
+    if (number == 1 && line.starts_with("\xef\xbb\xbf")) at += 3;  // byte-order mark
     const auto skip = [&] {
       while (at < end && (*at == ' ' || *at == '\t' || *at == '\r')) ++at;
     };
@@ -28,6 +29,7 @@ void read_rows(std::istream& in, const std::string& name, const char* const (&fi
       skip();
       if (at < end && *at == '+') ++at;
       const auto r = std::from_chars(at, end, values[k]);
+      if (r.ec == std::errc::result_out_of_range) bad(k, "is " + std::string(at, r.ptr) + ", out of range");
       if (r.ec != std::errc()) {
         if (rows == 0 && k == 0) {
           heading = true;

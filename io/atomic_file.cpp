@@ -11,9 +11,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <map>
 #include <mutex>
 #include <random>
 #include <set>
@@ -211,7 +213,48 @@ void write_all(const std::string& path, int fd, std::string_view bytes) {
   }
 }
 
+// A reader that leaves is an error of this file, not the end of the process.
+class WithoutBrokenPipeSignal {
+ public:
+  WithoutBrokenPipeSignal() {
+    struct sigaction ignore {};
+    ignore.sa_handler = SIG_IGN;
+    sigaction(SIGPIPE, &ignore, &before_);
+  }
+  ~WithoutBrokenPipeSignal() { sigaction(SIGPIPE, &before_, nullptr); }
+  WithoutBrokenPipeSignal(const WithoutBrokenPipeSignal&) = delete;
+  WithoutBrokenPipeSignal& operator=(const WithoutBrokenPipeSignal&) = delete;
+
+ private:
+  struct sigaction before_ {};
+};
+
+// A device or a pipe; waits a while for somebody who reads the pipe.
+int open_stream(const std::string& path, const fs::path& place) {
+  constexpr int kWaits = 100;  // of 20 ms
+  for (int i = 0;; ++i) {
+    const int fd = open(place.c_str(), O_WRONLY | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
+    if (fd >= 0) return fd;  // write_all waits where it is full
+    if (errno == ENXIO && i == kWaits) throw FileError(path, "cannot be written: nobody reads this pipe");
+    if (errno != ENXIO) fail_write(path, errno);
+    usleep(20000);
+  }
+}
+
 }  // namespace
+
+void check_distinct(const std::vector<std::string>& paths) {
+  std::map<fs::path, std::string> seen;
+  for (const std::string& path : paths) {
+    if (path.empty()) continue;
+    const Target target = find_target(path);
+    if (target.kind != Target::Kind::file) continue;
+    std::error_code code;
+    const fs::path place = fs::weakly_canonical(fs::absolute(target.path, code), code);
+    if (!seen.emplace(code ? target.path : place, path).second)
+      throw FileError(path, "is where two outputs shall be written");
+  }
+}
 
 void check_writable(const std::string& path, uint64_t bytes) {
   const Target target = find_target(path);
@@ -231,8 +274,8 @@ void write_whole_file(const std::string& path, std::string_view bytes) {
       return file.commit();
     }
     case Target::Kind::stream: {
-      const Descriptor out(open(target.path.c_str(), O_WRONLY | O_NOCTTY | O_CLOEXEC));
-      if (out.get() < 0) fail_write(path, errno);
+      const Descriptor out(open_stream(path, target.path));
+      const WithoutBrokenPipeSignal no_signal;
       return write_all(path, out.get(), bytes);
     }
     case Target::Kind::descriptor:

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "io/file_error.h"
+#include "io/physical_memory.h"
 
 namespace lumicut::io {
 
@@ -70,6 +71,11 @@ void check_image_size(const std::string& path, const OIIO::ImageInput& input) {
   if (!(pixels >= 1) || pixels > static_cast<double>(kMaxImagePixels))
     throw FileError(path,
                     fmt::format("has {} x {} pixels; 1 to {} are read", spec.width, spec.height, kMaxImagePixels));
+  const double bytes = pixels * spec.nchannels * sizeof(float);
+  if (bytes > 0.5 * static_cast<double>(physical_memory()))
+    throw FileError(
+        path, fmt::format("takes {:.1f} GB as {} x {} pixels of {} channels, more than half of this machine's memory",
+                          bytes / 1e9, spec.width, spec.height, spec.nchannels));
   if (!knows_limit(input.format_name(), spec.get_string_attribute("compression"))) return;
   const double size = static_cast<double>(std::filesystem::file_size(path));
   if (pixels * static_cast<double>(spec.pixel_bytes(true)) > size * kBestRatio)

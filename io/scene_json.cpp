@@ -168,7 +168,9 @@ class SceneReader {
       }
       object.finish();
     }
-    const Vec x{m[0], m[4], m[8]}, y{m[1], m[5], m[9]}, z{m[2], m[6], m[10]};
+    const auto as_float = [&](size_t k) { return static_cast<double>(static_cast<float>(m[k])); };  // as it is rendered
+    const Vec x{as_float(0), as_float(4), as_float(8)}, y{as_float(1), as_float(5), as_float(9)},
+        z{as_float(2), as_float(6), as_float(10)};
     if (!(std::abs(dot(cross(x, y), z)) > 0)) value.fail("the transform flattens space (its determinant is 0)");
     return m;
   }

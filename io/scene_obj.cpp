@@ -294,6 +294,9 @@ void read_mtl(const std::string& path, ObjModel& model, std::map<std::string, ui
     if (clipped)
       warnings.add("materials that reflect more than they receive", path, record.line,
                    fmt::format("{} reflects more than it receives; Kd and Ks are cut to 1", user));
+    if (!(mtl.dissolve >= 0.0f && mtl.dissolve <= 1.0f))
+      warnings.add("materials more than opaque or less than clear", path, record.line,
+                   fmt::format("{} has an opacity of {}, cut to 0..1", user, mtl.dissolve));
     m.shininess = std::min(mtl.shininess, 1e6f);
     m.opacity = std::clamp(mtl.dissolve, kHole, 1.0f);
     if (mtl.illum == 7) {

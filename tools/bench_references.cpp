@@ -21,7 +21,10 @@ std::string file_name_of(const std::string& text) {
   for (const char c : text) {
     const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '.' ||
                        c == '-' || c == '=' || c == '_';
-    if (plain || (!out.empty() && out.back() != '_')) out += plain ? c : '_';
+    if (static_cast<unsigned char>(c) >= 0x80)
+      out += fmt::format("{:02x}", static_cast<unsigned char>(c));  // names of other scripts stay apart
+    else if (plain || (!out.empty() && out.back() != '_'))
+      out += plain ? c : '_';
   }
   return out;
 }

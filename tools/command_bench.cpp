@@ -21,6 +21,7 @@
 #include "tools/bench_table.h"
 #include "tools/commands.h"
 #include "tools/progress_bar.h"
+#include "tools/render_setup.h"
 
 namespace lumicut::tools {
 
@@ -161,14 +162,7 @@ class BenchCommand {
     if (!o_.accel.empty()) plan_.accel = o_.accel;
     if (o_.repeat > 0) plan_.repeat = o_.repeat;
     std::vector<uint32_t> size;
-    if (!o_.size.empty()) {
-      size.resize(2);
-      int end = 0;
-      if (std::sscanf(o_.size.c_str(), "%ux%u%n", &size[0], &size[1], &end) != 2 ||
-          static_cast<size_t>(end) != o_.size.size() || size[0] == 0 || size[1] == 0 ||
-          std::max(size[0], size[1]) > 65536)
-        throw UsageError(fmt::format("--size {}: must be WIDTHxHEIGHT", o_.size));
-    }
+    if (!o_.size.empty()) size = image_size(o_.size);
     std::vector<std::string> names;
     for (const BenchScene& scene : plan_.scenes) names.push_back(scene.name);
     for (const auto& name : o_.only)
@@ -217,17 +211,30 @@ class BenchCommand {
                 {"rows", ordered_json::array()}};
     if (!stands || !o_.resume) return;
     const auto old = io::parse_json<ordered_json>(io::read_whole_file(results_file()), results_file());
-    if (!old.is_object() || old.value("format", "") != kFormat || !old.contains("rows") || !old["rows"].is_array())
-      throw io::FileError(results_file(), fmt::format("is no {} to go on with", kFormat));
-    // Rows of another library or machine are no part of this table: ratios between them would mean nothing.
-    if (old.value("git", "") != results_["git"].get<std::string>() ||
-        old["machine"]["processor"] != results_["machine"]["processor"]) {
-      say(fmt::format("{} is of another version or machine: all runs begin anew", results_file()));
-      return;
+    try {
+      if (old.at("format") != kFormat || !old.at("rows").is_array())
+        throw io::FileError(results_file(), fmt::format("is no {} to go on with", kFormat));
+      // Rows of another library or machine are no part of this table: ratios between them would mean nothing.
+      if (old.at("git") != results_["git"] || old.at("machine").at("processor") != results_["machine"]["processor"]) {
+        say(fmt::format("{} is of another version or machine: all runs begin anew", results_file()));
+        return;
+      }
+      for (const auto& row : old.at("rows"))
+        if (whole_row(row)) old_rows_.push_back(row);
+      for (const auto& entry : old.at("yardsticks"))
+        if (entry.at("scene").is_string() && entry.at("mray_per_second").is_number())
+          results_["yardsticks"].push_back(entry);
+    } catch (const nlohmann::json::exception& error) {
+      throw io::FileError(results_file(), fmt::format("lacks what going on needs: {}", error.what()));
     }
-    for (const auto& row : old["rows"])
-      if (row.is_object() && row.contains("job") && !row.contains("failed")) old_rows_.push_back(row);
-    results_["yardsticks"] = old.value("yardsticks", ordered_json::array());
+  }
+
+  // One that an earlier run has ended: what later rows are held against is there.
+  static bool whole_row(const ordered_json& row) {
+    if (!row.is_object() || !row.contains("job") || row.contains("failed")) return false;
+    const auto number = [&](const char* key) { return row.contains(key) && row[key].is_number(); };
+    return row.contains("run") && row["run"].is_string() && row.contains("seconds_each") && number("render_seconds") &&
+           number("preprocess_seconds") && number("total_seconds") && number("amortised_seconds");
   }
 
   void plan_groups() {
@@ -461,6 +468,8 @@ class BenchCommand {
         if (results_["rows"][i].value("run", "") == m.run && results_["rows"][i].contains("seconds_each"))
           other = &results_["rows"][i];
       if (other == nullptr) throw std::runtime_error(fmt::format("the run to match, {}, has no result", m.run));
+      if (!other->contains(m.measure) || !(*other)[m.measure].is_number())
+        throw std::runtime_error(fmt::format("the run to match, {}, has no {}", m.run, m.measure));
       target = (*other)[m.measure].get<double>();
       if (!(target > 0)) throw std::runtime_error(fmt::format("{} of the run to match is 0", m.measure));
     }
@@ -533,7 +542,8 @@ class BenchCommand {
       if (rows[i]["run"] == plan_.baseline) baseline = &rows[i];
       if (rows[i]["integrator"] == "exhaustive") exhaustive = &rows[i];
     }
-    if (exhaustive == nullptr && reference.info.contains("render_seconds")) exhaustive = &reference.info;
+    const auto timed = [&](const char* key) { return reference.info.contains(key) && reference.info[key].is_number(); };
+    if (exhaustive == nullptr && timed("render_seconds") && timed("preprocess_seconds")) exhaustive = &reference.info;
     for (size_t i = first; i < rows.size(); ++i) {
       if (!rows[i].contains("seconds_each")) continue;
       ordered_json speedup;

@@ -12,6 +12,7 @@
 #include "io/text_lines.h"
 #include "tools/commands.h"
 #include "tools/heat_map.h"
+#include "tools/render_setup.h"
 
 namespace lumicut::tools {
 
@@ -177,7 +178,7 @@ void add_compare(CLI::App& app) {
   command->add_option("--error-image", o->error_image, "Write a grey PNG of the differences");
   command->add_option("--scale", o->scale, "Factor of the differences in that image")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(number_in(1e-30, 1e30));
   command->add_option("--flip-image", o->flip_image, "Write a grey PNG of FLIP");
   command->add_option(
       "--error-map", o->error_map,
@@ -187,13 +188,15 @@ void add_compare(CLI::App& app) {
   command
       ->add_option("--error-map-top", o->error_map_top,
                    "Relative error at the colour bar's top (default: 1; of signed maps the 99th percentile, rounded)")
-      ->check(CLI::Range(1e-4, 1e4));
-  command->add_option("--ignore-above", o->ignore_above,
-                      "Leave out pixels whose reference luminance is at least this (visible lamps)");
+      ->check(number_in(1e-4, 1e4));
+  command
+      ->add_option("--ignore-above", o->ignore_above,
+                   "Leave out pixels whose reference luminance is at least this (visible lamps)")
+      ->check(number_in(0, 1e38));
   command
       ->add_option("--exposure", o->exposure,
                    "Factor from radiance to [0,1] for display measures (default: 0.18 / geometric mean)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_in(0, 1e30));
   command->add_option("--layer", o->layer, "Layer to compare, of both images")->capture_default_str();
   command->add_option("--reference-layer", o->reference_layer, "Layer of the reference, where it has another name");
   command->add_flag("--no-flip", o->no_flip, "Do without FLIP, the slowest measure");

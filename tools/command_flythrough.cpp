@@ -17,6 +17,7 @@
 #include "lumicut/lumicut_state.h"
 #include "tools/commands.h"
 #include "tools/exposed_png.h"
+#include "tools/interrupt_watcher.h"
 #include "tools/render_setup.h"
 
 namespace lumicut::tools {
@@ -118,6 +119,8 @@ class FlythroughCommand {
   explicit FlythroughCommand(const Options& options) : o_(options) {}
 
   void run() {
+    const std::vector<uint32_t> size = o_.size.empty() ? std::vector<uint32_t>{} : image_size(o_.size);
+    io::check_distinct({o_.output, o_.png, o_.stats, o_.save_state});
     for (const auto& path : {o_.output, o_.png, o_.stats, o_.save_state})
       if (!path.empty()) io::check_writable(path);
     create();
@@ -127,19 +130,18 @@ class FlythroughCommand {
     io::upload_scene(api(), scene_.get(), data);
     set_host_lights();
     io::check(api(), api().scene_set_camera(scene_.get(), cameras.data()), o_.cameras);
-    io::check(api(), api().scene_commit(scene_.get()), o_.scene);
-    stop_if_interrupted();
+    commit_scene(api(), watcher_, scene_.get(), o_.scene);
     prepare();
     frame_.struct_size = sizeof(frame_);
     frame_.width = data.width, frame_.height = data.height;
-    if (!o_.size.empty()) {
-      int end = 0;
-      if (std::sscanf(o_.size.c_str(), "%ux%u%n", &frame_.width, &frame_.height, &end) != 2 ||
-          static_cast<size_t>(end) != o_.size.size() || frame_.width == 0 || frame_.height == 0)
-        throw UsageError(fmt::format("--size {}: must be WIDTHxHEIGHT", o_.size));
-    }
+    if (!size.empty()) frame_.width = size[0], frame_.height = size[1];
     frame_.samples = o_.samples > 0 ? o_.samples : data.samples;
-    for (size_t i = 0; i < cameras.size(); ++i) render(cameras[i], i);
+    for (size_t i = 0; i < cameras.size(); ++i) try {
+        render(cameras[i], i);
+      } catch (const Interrupted&) {
+        if (i == 0) throw;
+        throw Interrupted(fmt::format("interrupted; {} of {} views are written", i, cameras.size()));
+      }
     report(cameras.size());
   }
 
@@ -169,7 +171,11 @@ class FlythroughCommand {
       if (state_->load(integrator_.get(), scene_.get(), bytes.data(), bytes.size()) != LUMICUT_OK)
         throw io::FileError(o_.load_state, api().last_error());
     } else {
-      io::check(api(), api().integrator_prepare(integrator_.get(), scene_.get()), "preparation");
+      watcher_.watch(integrator_.get());
+      const lumicut_result prepared = api().integrator_prepare(integrator_.get(), scene_.get());
+      watcher_.watch(nullptr);
+      stop_if_interrupted();
+      io::check(api(), prepared, "preparation");
     }
     prepare_seconds_ = now() - start;
     prepared_ = ordered_json::parse(api().stats_json(integrator_.get()));
@@ -257,6 +263,7 @@ class FlythroughCommand {
   lumicut_render_desc frame_{};
   double prepare_seconds_ = 0, total_seconds_ = 0;
   ordered_json prepared_, views_ = ordered_json::array();
+  InterruptWatcher watcher_{library_.api()};  // ends before the handles that it may cancel
 };
 
 }  // namespace
@@ -270,7 +277,7 @@ void add_flythrough(CLI::App& app) {
   command->add_option("-o,--output", o->output, "EXR to write for each view: a.exr becomes a.0000.exr, ...");
   command->add_option("--png", o->png, "PNG to write for each view");
   command->add_option("--exposure", o->exposure, "Factor from radiance to [0,1] for the PNGs (default: each its own)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_in(0, 1e30));
   command->add_option("--save-state", o->save_state, "File for what was prepared, to be loaded in later runs");
   command->add_option("--load-state", o->load_state, "Take what a run with the same scene and parameters has saved")
       ->excludes("--save-state");

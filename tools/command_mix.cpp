@@ -10,6 +10,7 @@
 #include "io/image_file.h"
 #include "tools/commands.h"
 #include "tools/exposed_png.h"
+#include "tools/render_setup.h"
 
 namespace lumicut::tools {
 
@@ -93,7 +94,7 @@ void add_mix(CLI::App& app) {
   command->add_option("--gain", o->gains, "GROUP=FACTOR or GROUP=R,G,B: how bright a group is; may be repeated");
   command->add_option("--others", o->others, "Factor of the groups that --gain does not name")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_in(0, 1e30));
   command->add_option("-o,--output", o->output, "EXR to write");
   add_png_options(*command, o->png, o->exposure);
   command->add_flag("--half", o->half, "16 bits a number in the EXR instead of 32");

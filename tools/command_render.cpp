@@ -126,6 +126,7 @@ class RenderCommand {
 
   // Before hours of work, not after.
   void check_outputs() {
+    io::check_distinct({o_.output, o_.png, o_.stats, o_.vpl_out, o_.checkpoint});
     for (const auto& path : {o_.output, o_.png, o_.stats, o_.vpl_out})
       if (!path.empty()) io::check_writable(path);
     if (!o_.heat_maps.empty()) {
@@ -136,7 +137,7 @@ class RenderCommand {
         throw io::FileError(o_.heat_maps, "is no folder, and cannot be made one");
       for (const CountLayer& layer : kCountLayers) io::check_writable(heat_map_path(layer));
     }
-    if (!o_.size.empty()) size_ = numbers(o_.size, 'x', 2, "--size");
+    if (!o_.size.empty()) size_ = image_size(o_.size);
     if (!o_.crop.empty()) crop_ = numbers(o_.crop, ',', 4, "--crop");
   }
 
@@ -187,8 +188,9 @@ class RenderCommand {
     if (o_.groups) desc_.flags |= LUMICUT_GROUPS;
     for (const auto& channel : choose_channels(api(), o_.layers))
       if (channel.name == "illuminance" && o_.layers != "all") desc_.flags |= LUMICUT_ILLUMINANCE;
-    if (o_.resume && std::filesystem::exists(o_.checkpoint)) {
+    if (std::error_code code; o_.resume && std::filesystem::exists(o_.checkpoint, code)) {
       resumed_ = io::read_whole_file(o_.checkpoint);
+      if (resumed_.empty()) throw io::FileError(o_.checkpoint, "is empty: no checkpoint");
       desc_.checkpoint = resumed_.data(), desc_.checkpoint_size = resumed_.size();
     }
     if (!crop_.empty() &&
@@ -520,14 +522,14 @@ void add_render(CLI::App& app) {
                    "else 1)")
       ->check(CLI::Range(0u, 1u << 30));
   command->add_option("--seconds", o->seconds, "Stop after the pass that ends nearest to this")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_in(0, 1e9));
   command
       ->add_option("--target-error", o->target_error,
                    "Stop when the error is known to this share, such as 0.02: of --confidence of the pixels, at "
                    "--confidence (after at least 8 passes)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_in(0, 1e9));
   command->add_option("--confidence", o->confidence, "Of the intervals in the layer `error` (default: 0.95)")
-      ->check(CLI::Range(0.5, 0.999));
+      ->check(number_in(0.5, 0.999));
   auto* checkpoint =
       command->add_option("--checkpoint", o->checkpoint, "File that a stopped or killed render goes on from");
   command->add_flag("--resume", o->resume, "Go on from --checkpoint, if it is there")->needs(checkpoint);

@@ -265,7 +265,7 @@ void report(const Options& o) {
   if (output.empty()) output = (std::filesystem::path(o.results).parent_path() / "report.html").string();
   io::check_writable(output);
   const auto results = io::parse_json<ordered_json>(io::read_whole_file(o.results), o.results);
-  if (!results.is_object() || results.value("format", "") != "lumicut-bench/1")
+  if (!results.is_object() || !results.contains("format") || results["format"] != "lumicut-bench/1")
     throw io::FileError(o.results, "is no result of `lumicut bench`: its \"format\" is not \"lumicut-bench/1\"");
   std::string html;
   try {

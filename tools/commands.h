@@ -26,7 +26,7 @@ class UsageError : public std::runtime_error {
 // Ctrl-C came.
 class Interrupted : public std::runtime_error {
  public:
-  Interrupted() : std::runtime_error("interrupted; nothing was written") {}
+  explicit Interrupted(const std::string& text = "interrupted; nothing was written") : std::runtime_error(text) {}
 };
 
 // Ends the command with this code; what there is to say has been said.

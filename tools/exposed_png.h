@@ -6,6 +6,7 @@
 
 #include "film/metrics.h"
 #include "io/image_file.h"
+#include "tools/render_setup.h"
 
 namespace lumicut::tools {
 
@@ -14,7 +15,7 @@ inline void add_png_options(CLI::App& command, std::string& png, float& exposure
   command.add_option("--png", png, "PNG to write too: exposed, cut to [0,1], sRGB");
   command
       .add_option("--exposure", exposure, "Factor from radiance to [0,1] for the PNG (default: 0.18 / geometric mean)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_in(0, 1e30));
 }
 
 // `exposure` 0: auto_exposure.

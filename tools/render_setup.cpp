@@ -78,6 +78,22 @@ void create_integrator(const io::Api& api, const RenderSetup& setup, lumicut_dev
   }
 }
 
+CLI::Validator number_in(double low, double high) {
+  return {[low, high](std::string& text) {
+            double value = 0;
+            if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return std::string();
+            return fmt::format("{} is no number from {:g} to {:g}", text, low, high);
+          },
+          fmt::format("FLOAT in [{:g} - {:g}]", low, high)};
+}
+
+std::vector<uint32_t> image_size(const std::string& text) {
+  const auto size = numbers(text, 'x', 2, "--size");
+  for (const uint32_t side : size)
+    if (side < 1 || side > 65536) throw UsageError(fmt::format("--size {}: {} is not 1 to 65536", text, side));
+  return size;
+}
+
 std::vector<uint32_t> numbers(const std::string& text, char separator, size_t count, const char* option) {
   std::vector<uint32_t> result;
   size_t start = 0;

@@ -11,7 +11,8 @@
 
 namespace CLI {
 class App;
-}
+class Validator;
+}  // namespace CLI
 
 namespace lumicut::tools {
 
@@ -42,6 +43,11 @@ void create_scene(const io::Api& api, const RenderSetup& setup, lumicut_device d
 void create_integrator(const io::Api& api, const RenderSetup& setup, lumicut_device device,
                        io::Handle<lumicut_integrator>& integrator);
 
+// For options of numbers: from `low` to `high`, and no NaN (which CLI::Range lets pass).
+CLI::Validator number_in(double low, double high);
+
+// --size: "512x384" -> {512, 384}, each 1 to 65536. Throws UsageError.
+std::vector<uint32_t> image_size(const std::string& text);
 // "512x384" -> {512, 384}; "a,b,c,d" with ','. Throws UsageError.
 std::vector<uint32_t> numbers(const std::string& text, char separator, size_t count, const char* option);
 

@@ -209,7 +209,6 @@ void Emitters::add_triangles(std::vector<double>& weights, const Progress* progr
     }
   }
   if (count == 0) return;
-  has_meshes_ = true;
   emitters_.reserve(emitters_.size() + count);
   weights.reserve(weights.size() + count);
 
@@ -258,6 +257,7 @@ void Emitters::add_triangles(std::vector<double>& weights, const Progress* progr
         const double area = 0.5 * length(cross(b - a, c - a));
         const double power = std::numbers::pi * area * emission * (material.emit_both_sides ? 2 : 1);
         if (!(power > 0.0)) continue;
+        has_meshes_ = true;
         emitters_.push_back({Kind::triangle, m, i, t});
         weights.push_back(power);
       }

@@ -59,6 +59,7 @@ void check_output(const std::string& path) {
 
 int hitting_set(const HittingArguments& a) {
   check_output(a.out);
+  io::check_distinct({a.out == "-" ? "" : a.out, a.picture});
   if (!a.picture.empty()) io::check_writable(a.picture);
   auto points_file = open(a.points), disks_file = open(a.disks);
   const auto points = read_points_csv(points_file, a.points);
@@ -237,6 +238,9 @@ int run(int argc, char** argv) {
   try {
     if (*hitting_command) return hitting_set(h);
     if (*net_command) return net(n);
+    for (const auto& [name, value] :
+         {std::pair{"--reach", r.reach}, {"--amount", r.amount}})  // CLI::Range lets NaN pass
+      if (!std::isfinite(value)) fail_argument(std::string(name) + " is " + std::to_string(value));
     return recluster(r);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "lumicut-geometry: %s\n", e.what());

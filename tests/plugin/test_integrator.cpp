@@ -4,7 +4,7 @@
 #include <set>
 #include <thread>
 
-#include "box_scene.h"
+#include "full_host.h"
 
 namespace {
 
@@ -375,6 +375,22 @@ std::vector<lumicut_point> room_points(size_t n) {
     p.pixel = static_cast<uint32_t>(i / 3);
   }
   return points;
+}
+
+TEST(Integrators, EmissionWithoutAreaLightsNothing) {
+  const api::Device device(1);
+  Host host;
+  host.lights.clear(), host.profiles.clear();
+  host.environment = make<lumicut_environment>();
+  for (size_t v = 3; v < host.panel.positions.size(); ++v) host.panel.positions[v] = host.panel.positions[v % 3];
+  const api::Scene s = host.scene(device);
+  for (const std::string& id : integrator_ids())
+    for (const char* compensate : {"false", "true"}) {
+      SCOPED_TRACE(id);
+      const api::Integrator i = integrator(device, 100, id.c_str());
+      lumicut_integrator_set(i.get(), "compensate", compensate);  // not every one has it
+      for (const float value : render(i, s, frame(16, 12))) EXPECT_EQ(value, 0.0f);
+    }
 }
 
 TEST(Shade, ManyThreadsAtOnceGetWhatOneGets) {

@@ -1,0 +1,142 @@
+"""What the command line says and files say of themselves is refused before work begins, by name."""
+import json
+import os
+import struct
+import subprocess
+import threading
+import unittest
+
+from cli import BAD_FILE, OK, SCENE, USAGE, Cli, lumicut
+
+SMALL = ["render", SCENE, "--size", "16x12", "--vpls", "50", "-q"]
+
+
+class Arguments(Cli):
+    def refused(self, code, *arguments, says):
+        self.assert_ends(lumicut(*arguments), code, says)
+
+    def test_numbers_that_are_none_are_no_numbers(self):
+        out = self.folder / "a.exr"
+        for option in ("--seconds", "--target-error", "--confidence", "--exposure"):
+            for value in ("nan", "-nan", "1e39", "inf"):
+                self.refused(USAGE, *SMALL, "-o", out, option, value, says=option)
+        self.refused(USAGE, "mix", out, "--others", "nan", "-o", self.folder / "b.exr", says="--others")
+        for option in ("--scale", "--error-map-top", "--ignore-above", "--exposure"):
+            self.refused(USAGE, "compare", out, out, option, "nan", says=option)
+        self.assertFalse(out.exists())
+
+    def test_sizes_do_not_wrap(self):
+        for size in ("4294967312x12", "-4294967280x12", "0x5", "65537x1", "16x", "16x12x1", "16.5x12"):
+            self.refused(USAGE, *SMALL[:2], f"--size={size}", "-q", "-o", self.folder / "a.exr", says="--size")
+            self.refused(USAGE, "flythrough", SCENE, self.folder / "none.json", f"--size={size}", "-o", self.folder / "f.exr", says="--size")
+            self.refused(USAGE, "bench", "--scene", SCENE, "--run", "exhaustive", f"--size={size}", "-o", self.folder / "b", says="--size")
+
+    def test_two_outputs_of_one_place_are_refused(self):
+        place = self.folder / "a.exr"
+        (self.folder / "link.exr").symlink_to(place)
+        for other in (place, f"{self.folder}/./a.exr", self.folder / "link.exr"):
+            self.refused(BAD_FILE, *SMALL, "-o", place, "--png", other, says="two outputs")
+            self.refused(BAD_FILE, *SMALL, "-o", other, "--checkpoint", place, says="two outputs")
+        self.assertFalse(place.exists())
+        self.assert_ends(lumicut(*SMALL, "-o", "/dev/null", "--png", "/dev/null"), OK)
+
+    def test_emission_of_no_area_gives_a_black_image(self):
+        scene = self.folder / "dark.json"
+        scene.write_text(json.dumps({
+            "image": {"size": [16, 12]}, "camera": {"eye": [0, 0.3, 3], "at": [0, 0, 0], "fov_y": 40},
+            "materials": [{"name": "m"}, {"name": "e", "emission": [5, 5, 5]}],
+            "meshes": [{"positions": [[-1, -1, 0], [1, -1, 0], [0, 1, 0]], "triangles": [[0, 1, 2]], "material": "m"},
+                       {"positions": [[0, 0, 0], [0, 0, 0], [0, 0, 0]], "triangles": [[0, 1, 2]], "material": "e"}]}))
+        self.assert_ends(lumicut("render", scene, "-p", "compensate=true", "--vpls", "100", "-q", "-o", self.folder / "o.exr"), OK)
+
+    def test_a_pipe_without_a_reader_is_an_error(self):
+        pipe = self.folder / "pipe"
+        os.mkfifo(pipe)
+        self.assert_ends(lumicut(*SMALL, "-o", pipe), BAD_FILE, "nobody reads")
+
+        def read_a_little():
+            with open(pipe, "rb") as stream:
+                stream.read(10)
+        reader = threading.Thread(target=read_a_little)
+        reader.start()
+        result = lumicut("render", SCENE, "--size", "200x150", "--vpls", "10", "--layers", "all", "-q", "-o", pipe)
+        reader.join()
+        self.assert_ends(result, BAD_FILE, str(pipe))
+
+    def test_what_is_no_checkpoint_is_named(self):
+        kept = self.folder / "kept"
+        kept.write_bytes(b"")
+        self.assert_ends(lumicut(*SMALL, "--checkpoint", kept, "--resume", "-o", self.folder / "a.exr"), BAD_FILE, str(kept))
+        loop = self.folder / "loop"
+        loop.symlink_to(loop)
+        self.assert_ends(lumicut(*SMALL, "--checkpoint", loop, "--resume", "-o", self.folder / "a.exr"), BAD_FILE, str(loop))
+
+    def test_damaged_results_of_a_bench_are_named(self):
+        out = self.folder / "bench"
+        plan = ["bench", "--scene", SCENE, "--run", "exhaustive", "--size", "16x12", "--vpls", "50", "-q", "-o", out]
+        self.assert_ends(lumicut(*plan), OK)
+        whole = json.loads((out / "results.json").read_text())
+        for path in (["machine"], ["machine", "processor"], ["git"], ["format"], ["rows"], ["yardsticks"]):
+            for value in (None, 1, "x"):
+                damaged = json.loads(json.dumps(whole))
+                at = damaged
+                for key in path[:-1]:
+                    at = at[key]
+                if value is None:
+                    del at[path[-1]]
+                else:
+                    at[path[-1]] = value
+                (out / "results.json").write_text(json.dumps(damaged))
+                result = lumicut(*plan, "--resume")
+                self.assertIn(result.returncode, (OK, BAD_FILE), (path, value, result.stderr))
+                if result.returncode == BAD_FILE:
+                    self.assertIn("results.json", result.stderr)
+        row = dict(whole["rows"][0])
+        del row["preprocess_seconds"]
+        (out / "results.json").write_text(json.dumps({**whole, "rows": [row]}))
+        self.assert_ends(lumicut(*plan, "--resume"), OK)  # the row is made anew
+        self.assertIn("preprocess_seconds", json.loads((out / "results.json").read_text())["rows"][0])
+        (self.folder / "r.json").write_text('{"format": 1}')
+        self.assert_ends(lumicut("report", self.folder / "r.json"), BAD_FILE, "r.json")
+
+    def test_a_picture_larger_than_memory_is_refused(self):
+        def attribute(name, kind, data):
+            return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(data)) + data
+        side, channels = 16384, 64
+        names = b"".join(b"c%02d\0" % c + struct.pack("<iBBBBii", 2, 0, 0, 0, 0, 1, 1) for c in range(channels)) + b"\0"
+        box = struct.pack("<iiii", 0, 0, side - 1, side - 1)
+        header = (attribute("channels", "chlist", names) + attribute("compression", "compression", b"\3") + attribute("dataWindow", "box2i", box)
+                  + attribute("displayWindow", "box2i", box) + attribute("lineOrder", "lineOrder", b"\0")
+                  + attribute("pixelAspectRatio", "float", struct.pack("<f", 1)) + attribute("screenWindowCenter", "v2f", bytes(8))
+                  + attribute("screenWindowWidth", "float", struct.pack("<f", 1)))
+        start = struct.pack("<ii", 20000630, 2) + header + b"\0"
+        chunks = side // 16
+        chunk = struct.pack("<ii", 0, 4) + bytes(2200)  # enough bytes a sample that the header alone is believed
+        table = b"".join(struct.pack("<Q", len(start) + 8 * chunks + i * len(chunk)) for i in range(chunks))
+        big = self.folder / "big.exr"
+        big.write_bytes(start + table + chunk * chunks)
+        if 4 * channels * side * side < os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2:
+            self.skipTest("this machine has more memory than the picture takes")
+        self.assert_ends(lumicut("compare", big, big), BAD_FILE, "memory")
+
+
+class Geometry(Cli):
+    def hitting_set(self, disks):
+        (self.folder / "points.csv").write_bytes(b"0,0\n0.1,0\n1,0\n")
+        (self.folder / "disks.csv").write_bytes(disks)
+        command = os.path.join(os.environ["LUMICUT_BINARY_DIR"], "bin/lumicut-geometry")
+        return subprocess.run([command, "hitting-set", "--points", self.folder / "points.csv", "--disks", self.folder / "disks.csv"],
+                              capture_output=True, text=True)
+
+    def test_a_byte_order_mark_or_a_number_out_of_range_is_no_heading(self):
+        self.assertEqual(self.hitting_set(b"\xef\xbb\xbfx,y,radius\n1,0,0.5\n").returncode, 0)
+        first = self.hitting_set(b"\xef\xbb\xbf5,5,0.5\n1,0,0.5\n")
+        self.assertNotEqual(first.returncode, 0)
+        self.assertIn("disk 0", first.stderr)
+        far = self.hitting_set(b"5e400,5,0.5\n1,0,0.5\n")
+        self.assertNotEqual(far.returncode, 0)
+        self.assertIn("line 1", far.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
