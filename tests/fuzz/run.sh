@@ -2,6 +2,7 @@
 # Fuzzes each target for so many minutes: tests/fuzz/run.sh MINUTES [TARGET...]. All targets without any named.
 # The seeds in corpus/TARGET come first; what is found beside them is kept in out/fuzz/corpus/TARGET and used again, and
 # inputs that crash, hang or leak are kept in out/fuzz/findings. Ends with 1 where there is one.
+#   LUMICUT_FUZZ_SEED    of its random numbers (another each time)
 #   LUMICUT_BINARY_DIR   the build (build/asan)        LUMICUT_FUZZ_OUTPUT   where to keep (out/fuzz)
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
@@ -39,7 +40,7 @@ for target in "$@"; do
   [ -f "$dictionary" ] || dictionary=
   echo "fuzz_$target: $seconds s"
   if ! "$binaries/fuzz_$target" -max_total_time="$seconds" -detect_leaks=0 -timeout=10 -rss_limit_mb=2048 -max_len=4096 -print_final_stats=1 \
-      -artifact_prefix="$output/findings/$target-" ${dictionary:+-dict="$dictionary"} "$kept" "$seeds" > "$log" 2>&1; then
+      -artifact_prefix="$output/findings/$target-" ${dictionary:+-dict="$dictionary"} ${LUMICUT_FUZZ_SEED:+-seed="$LUMICUT_FUZZ_SEED"} "$kept" "$seeds" > "$log" 2>&1; then
     tail -n 40 "$log"
     echo "fuzz_$target: a finding, in $output/findings; the log is $log" >&2
     failed=1
