@@ -247,7 +247,12 @@ void check_distinct(const std::vector<std::string>& paths) {
   std::map<fs::path, std::string> seen;
   for (const std::string& path : paths) {
     if (path.empty()) continue;
-    const Target target = find_target(path);
+    Target target;
+    try {
+      target = find_target(path);
+    } catch (const FileError&) {
+      continue;  // whoever writes there says so
+    }
     if (target.kind != Target::Kind::file) continue;
     std::error_code code;
     const fs::path place = fs::weakly_canonical(fs::absolute(target.path, code), code);
