@@ -245,11 +245,12 @@ void Emitters::add_triangles(std::vector<double>& weights, const Progress* progr
   for (uint32_t m = 0; m < scene_.meshes().size(); ++m) {
     const Mesh& mesh = scene_.meshes()[m];
     for (uint32_t t = 0; t < mesh.triangle_count(); ++t) {
+      check_now_and_then(progress, t);
       const Material& material = materials[mesh.material_of(t)];
       if (!material.emissive()) continue;
       const double emission = material.emission_texture >= 0 ? textured_[m][t] : luminance(material.emission);
       for (uint32_t i = 0; i < scene_.instance_count(m); ++i) {
-        check_now_and_then(progress, emitters_.size());
+        if (i > 0) check_now_and_then(progress, i);
         const Transform& to_world = scene_.instance(m, i);
         const uint32_t* index = &mesh.indices[3 * size_t{t}];
         const Vec3f a = to_world.point(mesh.positions[index[0]]), b = to_world.point(mesh.positions[index[1]]),
