@@ -88,7 +88,7 @@ CLI::Validator number_in(double low, double high) {
 }
 
 std::vector<uint32_t> image_size(const std::string& text) {
-  const auto size = numbers(text, 'x', 2, "--size");
+  auto size = numbers(text, 'x', 2, "--size");
   for (const uint32_t side : size)
     if (side < 1 || side > 65536) throw UsageError(fmt::format("--size {}: {} is not 1 to 65536", text, side));
   return size;
