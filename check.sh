@@ -12,10 +12,6 @@ step() { printf '\n== %s (%d s)\n' "$1" "$SECONDS"; }
 ./setup.sh
 case ${1-} in
   '') ;;
-  release | debug)
-    build "$1"
-    ctest --preset "$1"
-    exit ;;
   *)
     build "$1"
     ctest --preset "$1" --parallel "$(nproc)"
@@ -26,5 +22,5 @@ tools/dev/lint.sh --tidy
 step "build"
 build release
 step "tests"
-ctest --preset release
+ctest --preset release --parallel "$(nproc)"
 step "all passed"

@@ -18,7 +18,7 @@ BallQueryTree::BallQueryTree(std::span<const double> points, int dimension, cons
   if (points.size() % d != 0 || points.size() / d >= 0x7fffffffu)
     fail_argument("ball tree: " + std::to_string(points.size()) + " coordinates in rows of " + std::to_string(d));
   for (size_t i = 0; i < points.size(); ++i)
-    if (!(std::fabs(points[i]) <= 1e15))
+    if (!(std::fabs(points[i]) <= 1e18))  // squares stay finite in sums of 1,024
       fail_argument("ball tree: point " + std::to_string(i / d) + " has the coordinate " + std::to_string(points[i]));
   const auto n = static_cast<uint32_t>(points.size() / d);
   ids_.resize(n);

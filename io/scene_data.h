@@ -11,6 +11,9 @@
 
 namespace lumicut::io {
 
+// Of a coordinate or a length in the world, as the library has it: rays overflow single precision beyond.
+inline constexpr double kLargestCoordinate = 9e17;
+
 struct Texture {
   std::string file;
   uint32_t width = 0, height = 0, channels = 0;  // channels 1 or 3
@@ -40,6 +43,7 @@ struct Profile {
 };
 
 struct SceneData {
+  std::string file;  // it was read from, for messages
   std::vector<Texture> textures;
   std::vector<Material> materials;
   std::vector<Mesh> meshes;

@@ -25,7 +25,6 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr uint64_t kMaxSceneBytes = uint64_t{1} << 30;
-constexpr double kMaxCoordinate = 1e30;  // far beyond any scene, and sums of a few stay finite in float
 
 using Vec = std::array<double, 3>;
 
@@ -92,6 +91,7 @@ class SceneReader {
     std::move(lamps_.begin(), lamps_.end(), std::back_inserter(scene_.meshes));
     if (scene_.meshes.empty()) root.value().fail("has neither meshes nor visible lights: there is nothing to see");
     check_lit();
+    scene_.file = variables_.hide(path_);
     scene_.warnings.rewrite([&](const std::string& text) { return variables_.hide(text); });
     return std::move(scene_);
   } catch (const FileError& error) {
@@ -120,17 +120,20 @@ class SceneReader {
 
   // ---- Small parts ----
 
-  Vec point(const JsonValue& value) const { return value.vector3(-kMaxCoordinate, kMaxCoordinate) * scale_; }
+  // Of a coordinate or a length in the file's unit.
+  double largest() const { return kLargestCoordinate / scale_; }
+
+  Vec point(const JsonValue& value) const { return value.vector3(-largest(), largest()) * scale_; }
 
   // Scaled like a point, but of its own length.
   Vec edge(const JsonValue& value) const {
-    const Vec v = value.vector3(-kMaxCoordinate, kMaxCoordinate) * scale_;
+    const Vec v = value.vector3(-largest(), largest()) * scale_;
     if (!(length(v) > 0)) value.fail_expected("a vector that is not zero");
     return v;
   }
 
   static Vec direction(const JsonValue& value) {
-    const Vec v = value.vector3(-kMaxCoordinate, kMaxCoordinate);
+    const Vec v = value.vector3(-kLargestCoordinate, kLargestCoordinate);
     if (!(length(v) > 0)) value.fail_expected("a direction, which is not zero");
     return v * (1.0 / length(v));
   }
@@ -138,7 +141,7 @@ class SceneReader {
   static uint32_t group(JsonObject& object) { return static_cast<uint32_t>(object.integer("group", 0, 0, 65535)); }
 
   Matrix matrix(const JsonValue& value) const {
-    const auto numbers = value.numbers(12, -kMaxCoordinate, kMaxCoordinate);
+    const auto numbers = value.numbers(12, -kLargestCoordinate, kLargestCoordinate);
     Matrix m{};
     std::copy(numbers.begin(), numbers.end(), m.begin());
     return m;
@@ -163,7 +166,7 @@ class SceneReader {
         turn.finish();
       }
       if (auto translate = object.find("translate")) {
-        const Vec t = translate->vector3(-kMaxCoordinate, kMaxCoordinate);
+        const Vec t = translate->vector3(-kLargestCoordinate, kLargestCoordinate);
         for (size_t k = 0; k < 3; ++k) m[k * 4 + 3] += t[k];
       }
       object.finish();
@@ -197,7 +200,7 @@ class SceneReader {
     Matrix m{};
     if (auto given = object.find("matrix")) {
       m = matrix(*given);
-      for (const size_t k : {3u, 7u, 11u}) m[k] *= scale_;
+      for (const size_t k : {3u, 7u, 11u}) m[k] = checked(*given, m[k] * scale_);
       const Vec x{m[0], m[4], m[8]}, y{m[1], m[5], m[9]}, z{m[2], m[6], m[10]};
       if (!(std::abs(dot(cross(x, y), z)) > 0))
         given->fail("the camera's axes lie in one plane (the determinant is 0)");
@@ -217,21 +220,21 @@ class SceneReader {
     }
     for (size_t k = 0; k < 12; ++k) camera.to_world[k] = static_cast<float>(m[k]);
     if (camera.orthographic) {
-      camera.height = static_cast<float>(object.need("height").number(1e-20, kMaxCoordinate) * scale_);
+      camera.height = static_cast<float>(object.need("height").number(1e-20 / scale_, largest()) * scale_);
     } else {
-      camera.fov_y = static_cast<float>(radians(object.need("fov_y").number(0.001, 179.0)));
+      camera.fov_y = static_cast<float>(radians(object.need("fov_y").number(0.01, 179.0)));
     }
     if (auto shift = object.find("shift")) {
       const auto s = shift->numbers(2, -100, 100);
       camera.shift[0] = static_cast<float>(s[0]), camera.shift[1] = static_cast<float>(s[1]);
     }
-    camera.near_clip = static_cast<float>(object.number("near", 0, 0, kMaxCoordinate) * scale_);
-    camera.far_clip = static_cast<float>(object.number("far", 0, 0, kMaxCoordinate) * scale_);
+    camera.near_clip = static_cast<float>(object.number("near", 0, 0, largest()) * scale_);
+    camera.far_clip = static_cast<float>(object.number("far", 0, 0, largest()) * scale_);
     if (camera.far_clip != 0 && camera.far_clip <= camera.near_clip)
       value.fail("\"far\" must be beyond \"near\" (or 0: no limit)");
     camera.pixel_aspect = static_cast<float>(object.number("pixel_aspect", 1, 0.01, 100));
-    camera.lens_radius = static_cast<float>(object.number("lens_radius", 0, 0, kMaxCoordinate) * scale_);
-    camera.focus_distance = static_cast<float>(object.number("focus_distance", 0, 0, kMaxCoordinate) * scale_);
+    camera.lens_radius = static_cast<float>(object.number("lens_radius", 0, 0, largest()) * scale_);
+    camera.focus_distance = static_cast<float>(object.number("focus_distance", 0, 0, largest()) * scale_);
     if (camera.lens_radius > 0 && !(camera.focus_distance > 0))
       value.fail("a \"lens_radius\" needs a \"focus_distance\"");
     object.finish();
@@ -315,7 +318,7 @@ class SceneReader {
     if (auto distance = object.find("bump_distance")) {
       m.bump_distance = static_cast<float>(distance->number(-1e6, 1e6) * scale_);
       if (m.bump_distance == 0.0f) distance->fail("is 0: leave \"height_texture\" out instead");
-    } else if (m.bump_distance == 0.0f) {
+    } else if (m.height_texture != 0 && m.bump_distance == 0.0f) {
       m.bump_distance = static_cast<float>(scale_);
     }
     if (auto strength = object.find("bump_strength")) m.bump_strength = static_cast<float>(strength->number(1e-3, 10));
@@ -401,8 +404,9 @@ class SceneReader {
 
   static float checked(const JsonValue& value, double number) {
     const auto result = static_cast<float>(number);
-    if (!(std::abs(result) <= static_cast<float>(kMaxCoordinate)))
-      value.fail("its transform carries it beyond the range of float");
+    if (!(std::abs(result) <= static_cast<float>(kLargestCoordinate)))
+      value.fail(fmt::format("a coordinate becomes {:g} by transform and \"unit_scale\", beyond {:g}", number,
+                             kLargestCoordinate));
     return result;
   }
 
@@ -484,7 +488,7 @@ class SceneReader {
     Mesh mesh;
     const auto append = [](const JsonValue& list, std::vector<float>& out, size_t count) {
       for (const auto& element : list.elements())
-        for (const double x : element.numbers(count, -kMaxCoordinate, kMaxCoordinate))
+        for (const double x : element.numbers(count, -kLargestCoordinate, kLargestCoordinate))
           out.push_back(static_cast<float>(x));
     };
     append(object.need("positions"), mesh.positions, 3);
@@ -539,10 +543,10 @@ class SceneReader {
       light.radius = static_cast<float>(radians(object.number("angular_radius", 0, 0, 90)));
     } else if (light.type == LUMICUT_POINT || light.type == LUMICUT_SPOT) {
       store(light.position, point(object.need("position")));
-      light.radius = static_cast<float>(object.number("radius", 0, 0, kMaxCoordinate) * scale_);
+      light.radius = static_cast<float>(object.number("radius", 0, 0, largest()) * scale_);
       if (light.type == LUMICUT_SPOT) {
         store(light.direction, direction(object.need("direction")));
-        light.angle = static_cast<float>(radians(object.need("angle").number(0.01, 360)));
+        light.angle = static_cast<float>(radians(object.need("angle").number(0.12, 180)));
         light.blend = static_cast<float>(object.number("blend", 0, 0, 1));
         light.spot_cosine = object.boolean("cosine", false);
       }
@@ -634,7 +638,7 @@ class SceneReader {
     }
     store(light.position, centre), store(light.u, u), store(light.v, v);
     const auto spread = object.find("spread");
-    light.spread = spread ? static_cast<float>(radians(spread->number(0.1, 180))) : 0.0f;
+    light.spread = spread ? static_cast<float>(radians(spread->number(0.12, 180))) : 0.0f;
     const bool visible = object.boolean("visible", false);
     if (visible && spread && light.spread < static_cast<float>(kPi) - 1e-6f)
       spread->fail("a visible light is Lambertian: leave \"spread\" out");
@@ -653,7 +657,7 @@ class SceneReader {
     mesh.name = object.value().path();
     mesh.group = light.group;
     const auto add = [&](const Vec& p) {
-      for (const double x : p) mesh.positions.push_back(static_cast<float>(x));
+      for (const double x : p) mesh.positions.push_back(checked(object.value(), x));
     };
     double area = length(cross(u, v));
     if (light.type == LUMICUT_RECTANGLE) {

@@ -463,6 +463,8 @@ class ObjReader {
     if (words < least) fail(fmt::format("{} numbers instead of {}", words, least));
     for (const float value : values) {
       if (!std::isfinite(value)) fail("a number beyond the range of float");
+      if (*key == 'v' && key[1] == 0 && !(std::abs(value) <= static_cast<float>(kLargestCoordinate)))
+        fail(fmt::format("a coordinate beyond {:g}", kLargestCoordinate));
       list.push_back(value);
     }
     if (list.size() > kMaxCount) fail("too many vertices");

@@ -2,9 +2,34 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
+#include <string_view>
+
+#include "io/file_error.h"
+
 namespace lumicut::io {
 
-void upload_scene(const Api& api, lumicut_scene scene, const SceneData& data) {
+namespace {
+
+// "lumicut_light[3].angle: ..." -> "lights[5].angle: ..." as the file has it.
+std::string in_terms_of_file(std::string text, const SceneData& data) {
+  const auto rename = [&](std::string_view type, size_t count, auto name_of) {
+    const size_t begin = text.find(type);
+    if (begin == std::string::npos) return;
+    size_t index = 0;
+    const char* const digits = text.data() + begin + type.size();
+    const auto [end, error] = std::from_chars(digits, text.data() + text.size(), index);
+    if (error != std::errc() || end == text.data() + text.size() || *end != ']' || index >= count) return;
+    text.replace(begin, static_cast<size_t>(end + 1 - text.data()) - begin, name_of(index));
+  };
+  rename("lumicut_light[", data.light_names.size(), [&](size_t i) { return data.light_names[i]; });
+  rename("lumicut_material[", data.materials.size(), [&](size_t i) { return "\"" + data.materials[i].name + "\""; });
+  rename("lumicut_texture[", data.textures.size(), [&](size_t i) { return data.textures[i].file; });
+  rename("lumicut_profile[", data.profiles.size(), [&](size_t i) { return data.profiles[i].file; });
+  return text;
+}
+
+void upload(const Api& api, lumicut_scene scene, const SceneData& data) {
   std::vector<lumicut_texture> textures;
   for (const auto& texture : data.textures) {
     lumicut_texture t{};
@@ -50,6 +75,15 @@ void upload_scene(const Api& api, lumicut_scene scene, const SceneData& data) {
   if (!data.lights.empty()) check(api, api.scene_set_lights(scene, data.lights.data(), data.lights.size()), "lights");
   if (data.environment) check(api, api.scene_set_environment(scene, &*data.environment), "environment");
   check(api, api.scene_set_camera(scene, &data.camera), "camera");
+}
+
+}  // namespace
+
+void upload_scene(const Api& api, lumicut_scene scene, const SceneData& data) try {
+  upload(api, scene, data);
+} catch (const LibraryError& error) {
+  if (error.code() != LUMICUT_INVALID_ARGUMENT) throw;
+  throw FileError(data.file, in_terms_of_file(error.what(), data));
 }
 
 }  // namespace lumicut::io

@@ -9,7 +9,8 @@
 namespace lumicut::io {
 
 // Hands everything to `scene` (textures, materials, meshes, lights, environment, camera). Does not commit.
-// Throws LibraryError naming the part that the library refused.
+// Throws FileError in the scene file's terms where the library refuses a value of it, LibraryError naming the
+// part otherwise.
 void upload_scene(const Api& api, lumicut_scene scene, const SceneData& data);
 
 }  // namespace lumicut::io

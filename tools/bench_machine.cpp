@@ -9,9 +9,9 @@
 #include <thread>
 
 #include "io/physical_memory.h"
-#include "io/scene_json.h"
 #include "lumicut_git_version.h"
 #include "tools/commands.h"
+#include "tools/render_setup.h"
 
 namespace lumicut::tools {
 
@@ -90,7 +90,7 @@ Triangles flatten(const io::SceneData& scene) {
 
 ordered_json measure_yardstick(const io::Api& api, const std::string& scene, int threads) {
   constexpr size_t kRays = 1000000;
-  const Triangles triangles = flatten(io::read_scene(scene));
+  const Triangles triangles = flatten(read_scene_file(scene));
   std::vector<double> area_below;
   double area = 0;
   for (size_t t = 0; t < triangles.indices.size() / 3; ++t) {

@@ -151,6 +151,10 @@ class BenchCommand {
     if (o_.plan.empty() == (o_.scenes.empty() && o_.runs.empty()))
       throw UsageError("bench: give a plan (JSON), or --scene and --run, not both");
     if (o_.plan.empty()) {
+      for (const auto& scene : o_.scenes)
+        if (io::json_text(ordered_json(scene)) !=
+            ordered_json(scene).dump(-1, ' ', false, ordered_json::error_handler_t::ignore))
+          throw UsageError(fmt::format("--scene {}: the results are JSON, which holds paths in UTF-8 alone", scene));
       ordered_json plan = {{"name", "command line"}, {"scenes", o_.scenes}, {"runs", ordered_json::array()}};
       for (const auto& run : o_.runs) plan["runs"].push_back(run_of_text(run));
       plan_ = parse_bench_plan(io::json_text(plan), "command line", "", api());

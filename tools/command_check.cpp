@@ -6,7 +6,6 @@
 
 #include "io/json_reader.h"
 #include "io/library.h"
-#include "io/scene_json.h"
 #include "io/scene_upload.h"
 #include "tools/commands.h"
 #include "tools/forecast.h"
@@ -51,7 +50,7 @@ void check_scene(const Options& o) {
   const auto size = o.size.empty() ? std::vector<uint32_t>{} : numbers(o.size, 'x', 2, "--size");
 
   bar.show("reading files", 0, 0);
-  const io::SceneData data = io::read_scene(o.scene);
+  const io::SceneData data = read_scene_file(o.scene);
   stop_if_interrupted();
   io::upload_scene(api, scene.get(), data);
   lumicut_render_desc desc{};
@@ -68,6 +67,7 @@ void check_scene(const Options& o) {
     cost = forecast(api, o, scene.get(), integrator.get(), desc, bytes_of(data), [&](void* h) { watcher.watch(h); });
   }
   bar.show("examination", 0, 0);
+  const NothingToLose examining;
   const Preflight found =
       preflight(api, device.get(), data, preflight_options(api, integrator.get(), desc.width, desc.height));
   stop_if_interrupted();

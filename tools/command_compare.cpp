@@ -88,8 +88,10 @@ void write_error_map(const std::string& path, std::vector<float> errors, const i
 }
 
 void compare(const Options& options) {
-  for (const auto& path :
-       {options.error_image, options.flip_image, options.hdr_flip_image, options.error_map, options.signed_error_map})
+  const std::vector<std::string> outputs = {options.error_image, options.flip_image, options.hdr_flip_image,
+                                            options.error_map, options.signed_error_map};
+  io::check_distinct(outputs);
+  for (const auto& path : outputs)
     if (!path.empty()) io::check_writable(path);
   io::Image a, b;
   const auto image_pixels = load(options.image, options.layer, a);

@@ -17,7 +17,6 @@
 #include "io/image_file.h"
 #include "io/json_reader.h"
 #include "io/library.h"
-#include "io/scene_json.h"
 #include "io/scene_upload.h"
 #include "tools/commands.h"
 #include "tools/heat_map.h"
@@ -111,7 +110,7 @@ class ErrorsCommand {
     if (o_.integrator == "path_tracer")
       throw UsageError("errors: path_tracer is the truth that methods with virtual lights are measured against");
     bar_.show("reading files", 0, 0);
-    const io::SceneData data = io::read_scene(o_.scene);
+    const io::SceneData data = read_scene_file(o_.scene);
     bar_.wipe();
     tell_warnings(data.warnings, o_.scene, o_.strict);
     stop_if_interrupted();

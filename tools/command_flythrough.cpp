@@ -11,7 +11,6 @@
 #include "io/image_file.h"
 #include "io/json_reader.h"
 #include "io/library.h"
-#include "io/scene_json.h"
 #include "io/scene_upload.h"
 #include "io/vpl_file.h"
 #include "lumicut/lumicut_state.h"
@@ -124,7 +123,7 @@ class FlythroughCommand {
     for (const auto& path : {o_.output, o_.png, o_.stats, o_.save_state})
       if (!path.empty()) io::check_writable(path);
     create();
-    const io::SceneData data = io::read_scene(o_.scene);
+    const io::SceneData data = read_scene_file(o_.scene);
     tell_warnings(data.warnings, o_.scene, o_.strict);
     const auto cameras = read_cameras(o_.cameras, data.camera);
     io::upload_scene(api(), scene_.get(), data);

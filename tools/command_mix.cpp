@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "io/atomic_file.h"
 #include "io/file_error.h"
 #include "io/image_file.h"
 #include "tools/commands.h"
@@ -101,6 +102,7 @@ void add_mix(CLI::App& app) {
   command->footer("Example: lumicut mix room.exr --gain 1=0 --gain 2=1,0.8,0.6 -o evening.exr --png evening.png");
   command->callback([o] {
     if (o->output.empty() && o->png.empty()) throw UsageError("mix: nothing to write; give -o out.exr or --png");
+    io::check_distinct({o->output, o->png});
     mix(*o);
   });
 }

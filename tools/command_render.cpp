@@ -16,7 +16,6 @@
 #include "io/json_reader.h"
 #include "io/library.h"
 #include "io/physical_memory.h"
-#include "io/scene_json.h"
 #include "io/scene_upload.h"
 #include "io/vpl_file.h"
 #include "tools/commands.h"
@@ -126,7 +125,10 @@ class RenderCommand {
 
   // Before hours of work, not after.
   void check_outputs() {
-    io::check_distinct({o_.output, o_.png, o_.stats, o_.vpl_out, o_.checkpoint});
+    std::vector<std::string> outputs = {o_.output, o_.png, o_.stats, o_.vpl_out, o_.checkpoint};
+    if (!o_.heat_maps.empty())
+      for (const CountLayer& layer : kCountLayers) outputs.push_back(heat_map_path(layer));
+    io::check_distinct(outputs);
     for (const auto& path : {o_.output, o_.png, o_.stats, o_.vpl_out})
       if (!path.empty()) io::check_writable(path);
     if (!o_.heat_maps.empty()) {
@@ -160,6 +162,7 @@ class RenderCommand {
   void create_integrator() {
     create_integrator(integrator_);
     if (o_.vpl_in.empty()) return;
+    const NothingToLose reading;
     lights_ = io::read_vpls(o_.vpl_in);
     if (lights_.empty()) throw UsageError(fmt::format("--vpl-in {}: holds no light", o_.vpl_in));
   }
@@ -167,7 +170,7 @@ class RenderCommand {
   void read_scene() {
     const double start = now();
     bar_.show("reading files", 0, 0);
-    io::SceneData data = io::read_scene(o_.scene);
+    io::SceneData data = read_scene_file(o_.scene);
     bar_.wipe();
     if (o_.verbosity == 1 || o_.strict)  // above that they are told with all else
       tell_warnings(data.warnings, o_.scene, o_.strict);
@@ -189,6 +192,7 @@ class RenderCommand {
     for (const auto& channel : choose_channels(api(), o_.layers))
       if (channel.name == "illuminance" && o_.layers != "all") desc_.flags |= LUMICUT_ILLUMINANCE;
     if (std::error_code code; o_.resume && std::filesystem::exists(o_.checkpoint, code)) {
+      const NothingToLose reading;
       resumed_ = io::read_whole_file(o_.checkpoint);
       if (resumed_.empty()) throw io::FileError(o_.checkpoint, "is empty: no checkpoint");
       desc_.checkpoint = resumed_.data(), desc_.checkpoint_size = resumed_.size();
@@ -299,8 +303,16 @@ class RenderCommand {
     lumicut_render_desc desc = desc_;
     if (o_.squares > 0) desc.crop[0] = rect.x0, desc.crop[1] = rect.y0, desc.crop[2] = rect.x1, desc.crop[3] = rect.y1;
     parts_.emplace_back(rect, io::Handle<lumicut_render>(api()));
-    io::check(api(), api().render_start(integrator.get(), scene_.get(), &desc, parts_.back().second.out()), "render");
+    check_render(api().render_start(integrator.get(), scene_.get(), &desc, parts_.back().second.out()));
     resumed_.clear(), resumed_.shrink_to_fit();  // the render has its own
+  }
+
+  // What the library says against a checkpoint is the file's fault.
+  void check_render(lumicut_result result) const {
+    if (desc_.checkpoint == nullptr ||
+        (result != LUMICUT_INVALID_ARGUMENT && result != LUMICUT_INVALID_STATE && result != LUMICUT_UNSUPPORTED))
+      return io::check(api(), result, "render");
+    throw io::FileError(o_.checkpoint, api().last_error());
   }
 
   void wait_for(size_t index, size_t count) {
@@ -320,7 +332,7 @@ class RenderCommand {
     } while (result == LUMICUT_OK && (status.state == LUMICUT_RUNNING || status.state == LUMICUT_IDLE));
     watcher_.watch(nullptr);
     stop_if_interrupted();
-    io::check(api(), result, desc_.checkpoint != nullptr ? o_.checkpoint : "render");
+    check_render(result);
     if (desc_.checkpoint == nullptr || o_.seconds > 0 || o_.target_error > 0 ||
         status.passes_done <= std::max(1u, o_.passes))
       return;

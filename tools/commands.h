@@ -42,6 +42,16 @@ class SilentExit : public std::runtime_error {
 // Set by the first Ctrl-C (or SIGTERM); the second ends the program at once.
 extern volatile std::sig_atomic_t interrupted;
 void catch_interrupts();
+
+// While one lives, Ctrl-C ends the program at once: for work that reads alone, in loops of libraries that ask nobody.
+class NothingToLose {
+ public:
+  NothingToLose();
+  ~NothingToLose();
+  NothingToLose(const NothingToLose&) = delete;
+  NothingToLose& operator=(const NothingToLose&) = delete;
+};
+
 inline void stop_if_interrupted() {
   if (interrupted) throw Interrupted();
 }

@@ -15,9 +15,26 @@ namespace lumicut::tools {
 
 volatile std::sig_atomic_t interrupted = 0;
 
+namespace {
+volatile std::sig_atomic_t nothing_to_lose = 0;
+}
+
+NothingToLose::NothingToLose() {
+  nothing_to_lose = 1;
+  if (interrupted) nothing_to_lose = 0, throw Interrupted();
+}
+NothingToLose::~NothingToLose() { nothing_to_lose = 0; }
+
 void catch_interrupts() {
   struct sigaction action {};
-  action.sa_handler = [](int) { interrupted = 1; };
+  action.sa_handler = [](int) {
+    interrupted = 1;
+    if (!nothing_to_lose) return;
+    constexpr char kText[] = "\nlumicut: interrupted; nothing was written\n";
+    if (write(STDERR_FILENO, kText, sizeof(kText) - 1) < 0) {
+    }
+    _exit(kInterrupted);
+  };
   action.sa_flags = static_cast<int>(SA_RESETHAND);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);

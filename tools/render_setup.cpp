@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "io/file_error.h"
+#include "io/scene_json.h"
 #include "tools/commands.h"
 #include "tools/interrupt_watcher.h"
 
@@ -27,6 +28,11 @@ void add_setup_options(CLI::App& command, RenderSetup& setup) {
       ->check(CLI::IsMember({"robust", "fast"}))
       ->capture_default_str();
   command.add_flag("--strict", setup.strict, "Take what is only warned of in files as an error");
+}
+
+io::SceneData read_scene_file(const std::string& path) {
+  const NothingToLose reading;
+  return io::read_scene(path);
 }
 
 void tell_warnings(const io::Warnings& warnings, const std::string& file, bool strict) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "io/library.h"
+#include "io/scene_data.h"
 #include "io/warnings.h"
 
 namespace CLI {
@@ -28,6 +29,9 @@ struct RenderSetup {
 
 // -i, -p, --vpls, --seed, --threads, --accel, --builder, --rays, --strict.
 void add_setup_options(CLI::App& command, RenderSetup& setup);
+
+// io::read_scene, which Ctrl-C ends at once.
+io::SceneData read_scene_file(const std::string& path);
 
 // Prints on standard error what was noticed while the scene of that file was read; throws FileError when `strict` and
 // there is anything.

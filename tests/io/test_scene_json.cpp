@@ -420,7 +420,9 @@ TEST(SceneJson, WrongValuesAreNamedWithPathAndValue) {
   expect_in(at("/meshes/0/normals", json::parse("[[0,0,1]]")), {"meshes[0].normals", "1 entries for 4"});
   expect_in(at("/meshes/0/instances", json::array()), {"meshes[0].instances", "empty"});
   expect_in(at("/meshes/0/transform", {{"scale", 0}}), {"meshes[0].transform", "determinant"});
-  expect_in(at("/meshes/0/transform", {{"scale", 1e30}, {"translate", {1e30, 0, 0}}}), {"meshes[0]", "range"});
+  expect_in(at("/meshes/0/transform", {{"scale", 1e17}, {"translate", {8.9e17, 8.9e17, 8.9e17}}}),
+            {"meshes[0]", "9e+17"});
+  expect_in(at("/meshes/0/transform", {{"scale", 1e30}, {"translate", {1e30, 0, 0}}}), {"translate", "9e+17"});
   expect_in(at("/meshes/0/group", 70000), {"meshes[0].group", "70000"});
   expect_in(at("/meshes/0", {{"obj", ""}}), {"meshes[0].obj", "empty"});
   expect_in(at("/meshes/0", {{"obj", "none.obj"}}), {"none.obj", "no such file"});

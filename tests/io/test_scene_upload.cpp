@@ -82,12 +82,12 @@ TEST(SceneUpload, EverythingReachesTheLibrary) {
 
 TEST(SceneUpload, ARefusalCarriesTheLibrarysText) {
   const Api api = fake();
-  recorder.answer = LUMICUT_INVALID_ARGUMENT;
+  recorder.answer = LUMICUT_OUT_OF_MEMORY;
   try {
     upload_scene(api, nullptr, example());
     FAIL() << "no error";
   } catch (const LibraryError& error) {
-    EXPECT_EQ(error.code(), LUMICUT_INVALID_ARGUMENT);
+    EXPECT_EQ(error.code(), LUMICUT_OUT_OF_MEMORY);
     expect_in(error.what(), {"textures", "width: 0"});
   }
   EXPECT_EQ(recorder.meshes, 0u);

@@ -266,8 +266,9 @@ void lead_lives(const std::function<void()>& life, bool all_after, long tries, b
     }
   }
   const long lost = failing_memory::live_blocks() - blocks;
-  // Caches of oneTBB and of the C library come and go; Embree keeps the allocator of each thread that built.
-  if (lost > lives + 200) complain("%ld blocks more than before %ld lives: some leak", lost, lives);
+  // Caches of oneTBB and of the C library come and go; Embree keeps the allocator of each thread that built: one a life,
+  // and 248 whether 2,077 lives were led or 3,215.
+  if (lost > lives + 400) complain("%ld blocks more than before %ld lives: some leak", lost, lives);
 }
 
 // The same in a process of its own: where that dies, this one tells at which allocation, and goes on behind it.

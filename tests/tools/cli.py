@@ -57,6 +57,16 @@ def wait_until_busy(process, seconds):
         time.sleep(0.02)
 
 
+def wait_until_caught(process, number):
+    """Until the process has a handler for that signal."""
+    limit = time.monotonic() + 60
+    while process.poll() is None and time.monotonic() < limit:
+        caught = next(line for line in pathlib.Path(f"/proc/{process.pid}/status").read_text().splitlines() if line.startswith("SigCgt"))
+        if int(caught.split()[1], 16) >> (number - 1) & 1:
+            return
+        time.sleep(0.02)
+
+
 def read_png(data):
     """(width, height, rows of (r, g, b)) of an RGB PNG of 8 bits, not interlaced."""
     assert data.startswith(b"\x89PNG\r\n\x1a\n")

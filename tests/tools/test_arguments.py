@@ -1,12 +1,14 @@
 """What the command line says and files say of themselves is refused before work begins, by name."""
 import json
 import os
+import signal
 import struct
 import subprocess
 import threading
+import time
 import unittest
 
-from cli import BAD_FILE, OK, SCENE, USAGE, Cli, lumicut
+from cli import BAD_FILE, COMMAND, INTERRUPTED, OK, SCENE, USAGE, Cli, lumicut, wait_until_caught
 
 SMALL = ["render", SCENE, "--size", "16x12", "--vpls", "50", "-q"]
 
@@ -118,6 +120,61 @@ class Arguments(Cli):
         if 4 * channels * side * side < os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2:
             self.skipTest("this machine has more memory than the picture takes")
         self.assert_ends(lumicut("compare", big, big), BAD_FILE, "memory")
+
+
+    def scene(self, name="far.json", **changes):
+        scene = {"image": {"size": [16, 12]}, "camera": {"eye": [0, 0.3, 3], "at": [0, 0, 0], "fov_y": 40},
+                 "materials": [{"name": "m"}],
+                 "meshes": [{"positions": [[-1, -1, 0], [1, -1, 0], [0, 1, 0]], "triangles": [[0, 1, 2]], "material": "m"}],
+                 "lights": [{"type": "point", "position": [0, 2, 2], "value": 10}]}
+        path = self.folder / name
+        path.write_text(json.dumps({**scene, **changes}))
+        return path
+
+    def test_values_of_files_are_refused_in_the_files_terms(self):
+        lamp = {"type": "point", "position": [0, 2, 2], "value": 10}
+        for changes, says in (
+                ({"camera": {"eye": [0, 0, 1e18], "at": [0, 0, 0], "fov_y": 40}}, "camera.eye[2]"),
+                ({"camera": {"eye": [0, 0, 3], "at": [0, 0, 0], "fov_y": 0.001}}, "camera.fov_y"),
+                ({"camera": {"eye": [0, 0, 3], "at": [0, 0, 0], "fov_y": 40, "lens_radius": 1e18, "focus_distance": 1}}, "camera.lens_radius"),
+                ({"lights": [lamp, {**lamp, "radius": 1e18}]}, "lights[1].radius"),
+                ({"lights": [lamp, {**lamp, "type": "spot", "direction": [0, 0, 1], "angle": 360}]}, "lights[1].angle"),
+                # Only the library sees this one: the edges are of lengths that a file may have.
+                ({"lights": [lamp, {**lamp, "type": "rectangle", "u": [1e-20, 0, 0], "v": [0, 1e-20, 0]}]}, "lights[1].u"),
+                ({"unit_scale": 1e12, "camera": {"eye": [0, 0, 1e6], "at": [0, 0, 0], "fov_y": 40}}, "camera.eye[2]")):
+            path = self.scene(**changes)
+            self.assert_ends(lumicut("render", path, "-q", "-o", self.folder / "a.exr"), BAD_FILE, str(path), says)
+        (self.folder / "far.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1e18 0\nf 1 2 3\n")
+        self.assert_ends(lumicut("render", self.scene(meshes=[{"obj": "far.obj"}]), "-q", "-o", self.folder / "a.exr"), BAD_FILE,
+                         "far.obj", "line 3")
+
+    def test_any_unit_renders(self):
+        for scale in (1e-9, 1e9):
+            self.assert_ends(lumicut("render", self.scene(unit_scale=scale), "-q", "-o", self.folder / "a.exr"), OK)
+
+    def test_a_checkpoint_of_something_else_is_the_files_fault(self):
+        kept = self.folder / "kept"
+        kept.write_bytes(b"no checkpoint" * 100)
+        self.assert_ends(lumicut(*SMALL, "--checkpoint", kept, "--resume", "-o", self.folder / "a.exr"), BAD_FILE, str(kept))
+        self.assert_ends(lumicut(*SMALL, "--checkpoint", kept, "-o", self.folder / "a.exr"), OK)
+        self.assert_ends(lumicut("render", self.scene(), "-q", "--checkpoint", kept, "--resume", "-o", self.folder / "b.exr"), BAD_FILE, str(kept))
+
+    def test_ctrl_c_ends_the_reading_of_files_at_once(self):
+        (self.folder / "big.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * 6000000)
+        path = self.scene(meshes=[{"obj": "big.obj"}, {"obj": "none.obj"}])
+        started = time.monotonic()
+        self.assert_ends(lumicut("check", path), BAD_FILE, "none.obj")
+        whole = time.monotonic() - started
+        for command in (["render", path, "-o", self.folder / "a.exr"], ["check", path]):
+            process = subprocess.Popen([COMMAND, *map(str, command)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            wait_until_caught(process, signal.SIGINT)
+            time.sleep(whole / 8)
+            process.send_signal(signal.SIGINT)
+            started = time.monotonic()
+            said = process.communicate()[1]
+            self.assertEqual(process.returncode, INTERRUPTED)
+            self.assertIn("nothing was written", said)
+            self.assertLess(time.monotonic() - started, whole / 4)
 
 
 class Geometry(Cli):
