@@ -19,8 +19,8 @@ HWY_INLINE void Run(std::span<const Vpl> lights, float weight, float clamp2, con
     const size_t p = first + i;
     const V3 position = Load3(d, points.position, p), normal = Load3(d, points.normal, p);
     V3 mirror{zero, zero, zero};
-    V shininess = zero;
-    if constexpr (kLobes != Lobes::none) mirror = Load3(d, points.mirror, p), shininess = Load1(d, points.shininess, p);
+    if constexpr (kLobes != Lobes::none) mirror = Load3(d, points.mirror, p);
+    const LobeShape shape = LoadShape<kLobes>(d, points, p);
     // Summed over lights: what diffuse, specular and grazing multiply.
     V3 even{zero, zero, zero}, lobed{zero, zero, zero}, edge{zero, zero, zero};
     const auto add_to = [](V3& total, const V3& intensity, V factor) {
@@ -31,7 +31,7 @@ HWY_INLINE void Run(std::span<const Vpl> lights, float weight, float clamp2, con
       V3 to_light;
       const V3 intensity = Set3(d, light.intensity);
       if constexpr (kKind == VplKind::sphere) {
-        const Parts parts = SphereParts<kLobes, true>(d, light, points, p, position, normal, to_light);
+        const LobeSums parts = SphereLobes<kLobes, true>(d, light, points, p, position, normal, to_light);
         add_to(even, intensity, parts.diffuse);
         if constexpr (kLobes != Lobes::none) add_to(lobed, intensity, parts.specular);
         if constexpr (kLobes == Lobes::ggx) add_to(edge, intensity, parts.grazing);
@@ -40,7 +40,7 @@ HWY_INLINE void Run(std::span<const Vpl> lights, float weight, float clamp2, con
       const V geometry = Geometry<kKind>(d, light, clamp2, position, normal, to_light);
       if constexpr (kLobes == Lobes::ggx) {
         if (hn::AllFalse(d, hn::Gt(geometry, zero))) continue;
-        const Parts parts = PartsTowards<kLobes>(d, points, p, normal, mirror, shininess, to_light);
+        const LobeSums parts = LobesTowards<kLobes>(d, points, p, normal, mirror, shape, to_light);
         add_to(even, intensity, hn::Mul(geometry, parts.diffuse));
         add_to(lobed, intensity, hn::Mul(geometry, parts.specular));
         add_to(edge, intensity, hn::Mul(geometry, parts.grazing));
@@ -50,7 +50,7 @@ HWY_INLINE void Run(std::span<const Vpl> lights, float weight, float clamp2, con
       if constexpr (kLobes == Lobes::cosine) {
         const V cosine = Dot(mirror, to_light);
         if (hn::AllFalse(d, hn::And(hn::Gt(cosine, zero), hn::Gt(geometry, zero)))) continue;
-        add_to(lobed, intensity, hn::Mul(Lobe(d, cosine, shininess), geometry));
+        add_to(lobed, intensity, hn::Mul(CosineLobe(d, cosine, shape.exponent), geometry));
       }
     }
     const V3 diffuse = Load3(d, points.diffuse, p);

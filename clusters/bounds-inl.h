@@ -7,10 +7,8 @@
 #define LUMICUT_CLUSTERS_BOUNDS_INL_H_
 #endif
 
+#include "bsdf/reflectance-inl.h"
 #include "clusters/bounds.h"
-#include "clusters/lanes-inl.h"
-
-#include "hwy/contrib/math/math-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
@@ -69,60 +67,6 @@ HWY_INLINE V BoundOfLuminance(D d, const V3& f, V geometry, const Rgb& intensity
   const V3 weight =
       Set3(d, {0.2126f * 1.0001f * intensity.x, 0.7152f * 1.0001f * intensity.y, 0.0722f * 1.0001f * intensity.z});
   return hn::Mul(geometry, Dot(f, weight));
-}
-
-// Largest value of the glossy lobe at the largest cosine `beta` to the mirror direction.
-HWY_INLINE V BoundOfLobe(D d, V beta, V shininess) {
-  // Rounding of the cosine is magnified by the exponent: a part in 10^6 of slack before it.
-  beta = hn::Min(hn::Set(d, 1.0f), hn::MulAdd(beta, hn::Set(d, 1.000001f), hn::Set(d, 1e-6f)));
-  const V base = hn::Max(beta, hn::Set(d, 1e-20f));
-  const V lobe = hn::Exp(d, hn::Max(hn::Mul(shininess, hn::Log(d, base)), hn::Set(d, -80.0f)));
-  return hn::IfThenElseZero(hn::Gt(beta, hn::Zero(d)), lobe);
-}
-
-// A part in 10^4 against the rounding of sharp lobes' angles.
-constexpr float kGgxSlack = 1.0002f;
-
-// Largest D·V·(n·l) over `cosine`, of lights at most `cosine` to the normal and `beta` to the mirror direction, for
-// α² between `low2` and `high2` and n·v of `nv` or more. The half vector is turned from the normal by at least half as
-// much as the light from the mirror direction; D is largest where α² is that turn's squared tangent, V grows with n·l.
-HWY_INLINE V BoundOfGgxLobe(D d, V beta, V cosine, V low2, V high2, V nv) {
-  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-  beta = hn::Min(one, hn::Add(beta, hn::Set(d, 1e-6f)));
-  const V nl = hn::Min(one, hn::Max(cosine, hn::Set(d, 1e-7f)));
-  const V sine2 = hn::Mul(hn::Set(d, 0.5f), hn::Sub(one, beta)), cosine2 = hn::Sub(one, sine2);
-  const V best = hn::Div(sine2, hn::Max(cosine2, hn::Set(d, 1e-6f)));
-  const V a2 = hn::Min(high2, hn::Max(low2, best));
-  const V e = hn::MulAdd(a2, cosine2, sine2), rest = hn::Sub(one, low2);
-  nv = hn::Max(nv, hn::Set(d, 1e-4f));
-  const V root_v = hn::Sqrt(hn::Max(zero, hn::MulAdd(hn::Mul(nv, nv), rest, low2)));
-  const V root_l = hn::Sqrt(hn::Max(zero, hn::MulAdd(hn::Mul(nl, nl), rest, low2)));
-  const V smith = hn::MulAdd(nl, root_v, hn::Mul(nv, root_l));
-  return hn::Div(hn::Mul(a2, hn::Set(d, 0.15915494309f * kGgxSlack)), hn::Mul(hn::Mul(e, e), smith));
-}
-
-// Largest (1 − v·h)⁵: lights are at most `beta` to the mirror direction and above the horizon, views at least `nv` to
-// the normal.
-HWY_INLINE V BoundOfFresnel(D d, V beta, V nv) {
-  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-  const V sine = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(nv, nv, one)));
-  const V apart = hn::Min(hn::Add(sine, hn::Set(d, 1e-6f)), hn::Add(beta, hn::Set(d, 1e-6f)));  // −v·l, at most
-  const V vh = hn::Sqrt(hn::Max(zero, hn::Mul(hn::Set(d, 0.5f), hn::Sub(one, apart))));
-  const V m = hn::Sub(one, vh), m2 = hn::Mul(m, m);
-  return hn::Mul(hn::Mul(m2, m2), m);
-}
-
-// specular + (grazing − specular)·fresnel, where that is more.
-HWY_INLINE V3 BoundOfSchlick(D d, const V3& specular, const V3& grazing, V fresnel) {
-  const auto one = [&](V s, V g) { return hn::MulAdd(hn::Max(hn::Zero(d), hn::Sub(g, s)), fresnel, s); };
-  return {one(specular.x, grazing.x), one(specular.y, grazing.y), one(specular.z, grazing.z)};
-}
-
-// Largest factor of the diffuse part, which grows with the cosine.
-HWY_INLINE V BoundOfFading(D d, V fade, V cosine) {
-  const V one = hn::Set(d, 1.0f);
-  const V m = hn::Sub(one, hn::Min(one, hn::Max(hn::Zero(d), cosine))), m2 = hn::Mul(m, m);
-  return hn::NegMulAdd(fade, hn::Mul(m2, m2), one);
 }
 
 // Largest solid angle over πr² of a node's spheres, from points at `dist2` or farther of their centres: 2/(d²(1+cosα))
@@ -225,23 +169,23 @@ HWY_INLINE void Bounds(const LightNode& node, const PointBlock& block, float cla
       else
         beta = CosineToBox(d, to_center, half, Load3(d, block.mirror_tangent, i), Load3(d, block.mirror_bitangent, i),
                            mirror);
-      const V shininess = hn::Load(d, block.shininess + i);
+      const LobeShape shape = LoadShape<kLobes>(d, block, i);
       if constexpr (kLobes == Lobes::cosine) {
-        const V lobe = BoundOfLobe(d, beta, shininess);
+        const V lobe = BoundOfCosineLobe(d, beta, shape.exponent);
         f = {hn::MulAdd(specular.x, lobe, f.x), hn::MulAdd(specular.y, lobe, f.y), hn::MulAdd(specular.z, lobe, f.z)};
       } else {
-        const auto ggx = hn::Lt(shininess, zero);
-        V lobe = hn::AllTrue(d, ggx) ? zero : BoundOfLobe(d, beta, hn::Max(zero, shininess));
+        const auto ggx = shape.is_ggx(d);
+        V lobe = hn::AllTrue(d, ggx) ? zero : BoundOfCosineLobe(d, beta, shape.exponent);
         V3 share = specular;
         if (!hn::AllFalse(d, ggx)) {
-          const V nv = Dot(normal, mirror), alpha2 = Square(shininess);
+          const V nv = Dot(normal, mirror), alpha2 = Square(shape.alpha);
           V ggx_lobe = BoundOfGgxLobe(d, beta, cosine, alpha2, alpha2, nv);
           if constexpr (kSpheres) ggx_lobe = hn::Mul(ggx_lobe, steep);
           lobe = hn::IfThenElse(ggx, ggx_lobe, lobe);
           const V fresnel = hn::IfThenElseZero(ggx, BoundOfFresnel(d, beta, nv));
           share = BoundOfSchlick(d, specular, Load3(d, block.grazing, i), fresnel);
-          const V fading = BoundOfFading(d, hn::Load(d, block.fade + i), cosine);
-          f = {hn::Mul(f.x, fading), hn::Mul(f.y, fading), hn::Mul(f.z, fading)};
+          const V falloff = BoundOfDiffuseFalloff(d, hn::Load(d, block.falloff + i), cosine);
+          f = {hn::Mul(f.x, falloff), hn::Mul(f.y, falloff), hn::Mul(f.z, falloff)};
         }
         f = {hn::MulAdd(share.x, lobe, f.x), hn::MulAdd(share.y, lobe, f.y), hn::MulAdd(share.z, lobe, f.z)};
       }

@@ -37,7 +37,7 @@ void PointBlock::load(const ShadePoints& points, size_t first) {
       mirror[k][i] = p.mirror[k], mirror_tangent[k][i] = m.t[k], mirror_bitangent[k][i] = m.b[k];
       diffuse[k][i] = p.diffuse[k], specular[k][i] = p.specular[k], grazing[k][i] = p.grazing[k];
     }
-    shininess[i] = p.shininess, fade[i] = p.fade;
+    exponent[i] = p.exponent, falloff[i] = p.falloff, alpha[i] = p.alpha;
     ggx = ggx || p.ggx();
   }
 }

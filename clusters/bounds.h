@@ -2,8 +2,8 @@
 // sec. 3.4]
 #pragma once
 
+#include "bsdf/shade_points.h"
 #include "clusters/light_tree.h"
-#include "scene/shade_points.h"
 
 namespace lumicut {
 
@@ -12,7 +12,8 @@ struct alignas(64) PointBlock {
   float position[3][kLanes];
   float normal[3][kLanes], tangent[3][kLanes], bitangent[3][kLanes];
   float mirror[3][kLanes], mirror_tangent[3][kLanes], mirror_bitangent[3][kLanes];
-  float diffuse[3][kLanes], specular[3][kLanes], grazing[3][kLanes], shininess[kLanes], fade[kLanes];
+  float diffuse[3][kLanes], specular[3][kLanes], grazing[3][kLanes];
+  float exponent[kLanes], falloff[kLanes], alpha[kLanes];
   bool glossy = false, ggx = false;  // any of the points
 
   // Points [first, first + kLanes) of `points`, first a multiple of kLanes.

@@ -1,6 +1,6 @@
 #include "clusters/light_kernel.h"
 
-#include "scene/bsdf.h"
+#include "bsdf/point_bsdf.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "clusters/light_kernel.cpp"
@@ -13,7 +13,7 @@ HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Twin of mean_cosine.
+// SIMD counterpart of mean_cosine.
 HWY_INLINE V MeanCosine(D d, const Vec3f& normal, const DirectionScatter& s, const V3& to_light) {
   const V c = hn::Neg(Dot(Set3(d, normal), to_light));
   const V diagonal = hn::MulAdd(hn::Mul(to_light.x, to_light.x), hn::Set(d, s.xx),

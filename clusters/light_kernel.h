@@ -6,8 +6,8 @@
 #include <cstdint>
 
 #include "accel/accel.h"
+#include "bsdf/shade_points.h"
 #include "core/stats.h"
-#include "scene/shade_points.h"
 #include "vpl/vpl.h"
 
 namespace lumicut {

@@ -88,7 +88,7 @@ HWY_INLINE void PairBoundsOf(const LightNode& node, const PointNodes& nodes, flo
         beta = CosineToBox(d, to_center, half, Load3(d, nodes.mirror_tangent, i), Load3(d, nodes.mirror_bitangent, i),
                            mirror);
       beta = WidenByCone(d, beta, hn::Load(d, nodes.mirror_cos + i), hn::Load(d, nodes.mirror_sin + i));
-      const V lobe = BoundOfLobe(d, beta, hn::Load(d, nodes.shininess + i));
+      const V lobe = BoundOfCosineLobe(d, beta, hn::Load(d, nodes.exponent + i));
       if constexpr (kLobes == Lobes::cosine)
         f = {hn::MulAdd(specular.x, lobe, f.x), hn::MulAdd(specular.y, lobe, f.y), hn::MulAdd(specular.z, lobe, f.z)};
       if constexpr (kLobes == Lobes::ggx) {
@@ -102,8 +102,8 @@ HWY_INLINE void PairBoundsOf(const LightNode& node, const PointNodes& nodes, flo
         // A point has one of the two lobes.
         gloss = {hn::Max(gloss.x, hn::Mul(share.x, ggx)), hn::Max(gloss.y, hn::Mul(share.y, ggx)),
                  hn::Max(gloss.z, hn::Mul(share.z, ggx))};
-        const V fading = BoundOfFading(d, hn::Load(d, nodes.fade + i), cosine);
-        f = {hn::MulAdd(f.x, fading, gloss.x), hn::MulAdd(f.y, fading, gloss.y), hn::MulAdd(f.z, fading, gloss.z)};
+        const V falloff = BoundOfDiffuseFalloff(d, hn::Load(d, nodes.falloff + i), cosine);
+        f = {hn::MulAdd(f.x, falloff, gloss.x), hn::MulAdd(f.y, falloff, gloss.y), hn::MulAdd(f.z, falloff, gloss.z)};
       }
     }
     hn::StoreU(BoundOfLuminance(d, f, geometry, node.intensity), d, bounds + i);
@@ -165,29 +165,29 @@ void PointNodes::set(size_t lane, const ShadePoints& points, size_t first, size_
   Aabb box, normals, mirrors;
   Rgb kd{}, ks{}, f0{}, f90{};
   constexpr float kMost = std::numeric_limits<float>::infinity();
-  float least = kMost, low2 = kMost, high2 = 0.0f, view = 1.0f, fades = kMost;
+  float least = kMost, low2 = kMost, high2 = 0.0f, view = 1.0f, least_falloff = kMost;
   for (size_t i = first; i < first + count; ++i) {
     box.extend(points.position_at(i));
     normals.extend(points.normal_at(i));
     kd = max(kd, Rgb{points.diffuse[0][i], points.diffuse[1][i], points.diffuse[2][i]});
     const Rgb s{points.specular[0][i], points.specular[1][i], points.specular[2][i]};
-    fades = std::min(fades, points.fade[i]);
+    least_falloff = std::min(least_falloff, points.falloff[i]);
     const Rgb edge{points.grazing[0][i], points.grazing[1][i], points.grazing[2][i]};
     if (!(max_component(s) > 0.0f || max_component(edge) > 0.0f)) continue;
     const Vec3f m{points.mirror[0][i], points.mirror[1][i], points.mirror[2][i]};
     mirrors.extend(m);
-    if (const float n = points.shininess[i]; n < 0.0f) {
+    if (const float alpha = points.alpha[i]; alpha > 0.0f) {
       f0 = max(f0, s), f90 = max(f90, edge);
-      low2 = std::min(low2, n * n), high2 = std::max(high2, n * n);
+      low2 = std::min(low2, alpha * alpha), high2 = std::max(high2, alpha * alpha);
       view = std::min(view, dot(points.normal_at(i), m));
     } else {
       ks = max(ks, s);
-      least = std::min(least, n);
+      least = std::min(least, points.exponent[i]);
     }
   }
   const bool shiny = !mirrors.empty();
   glossy = glossy || shiny;
-  ggx = ggx || high2 > 0.0f || fades > 0.0f;
+  ggx = ggx || high2 > 0.0f || least_falloff > 0.0f;
   used |= 1u << lane;
   const auto put = [lane](float(&to)[3][kLanes], const Vec3f& v) {
     for (int k = 0; k < 3; ++k) to[k][lane] = v[k];
@@ -202,9 +202,9 @@ void PointNodes::set(size_t lane, const ShadePoints& points, size_t first, size_
   normal_cos[lane] = facing.cos_half, normal_sin[lane] = facing.sin_half();
   mirror_cos[lane] = shine.cos_half, mirror_sin[lane] = shine.sin_half();
   put(diffuse, kd), put(specular, ks);
-  shininess[lane] = least < kMost ? least : 0.0f;
+  exponent[lane] = least < kMost ? least : 0.0f;
   put(schlick, f0), put(grazing, f90);
-  view_cosine[lane] = view, fade[lane] = fades;
+  view_cosine[lane] = view, falloff[lane] = least_falloff;
   alpha2_low[lane] = high2 > 0.0f ? low2 : 1.0f, alpha2_high[lane] = high2 > 0.0f ? high2 : 1.0f;
 }
 
@@ -214,8 +214,8 @@ void PointNodes::pad(size_t lane) {
     for (auto* a : {&center, &half, &normal, &tangent, &bitangent, &mirror, &mirror_tangent, &mirror_bitangent,
                     &diffuse, &specular, &schlick, &grazing})
       copy((*a)[k]);
-  for (auto* a : {&normal_cos, &normal_sin, &mirror_cos, &mirror_sin, &shininess, &radius2, &alpha2_low, &alpha2_high,
-                  &view_cosine, &fade})
+  for (auto* a : {&normal_cos, &normal_sin, &mirror_cos, &mirror_sin, &exponent, &radius2, &alpha2_low, &alpha2_high,
+                  &view_cosine, &falloff})
     copy(*a);
 }
 

@@ -2,8 +2,8 @@
 // 2006 sec. 3.4]
 #pragma once
 
+#include "bsdf/shade_points.h"
 #include "clusters/light_tree.h"
-#include "scene/shade_points.h"
 
 namespace lumicut {
 
@@ -15,11 +15,11 @@ struct alignas(64) PointNodes {
   float mirror[3][kLanes], mirror_tangent[3][kLanes], mirror_bitangent[3][kLanes], mirror_cos[kLanes],
       mirror_sin[kLanes];
   float diffuse[3][kLanes], specular[3][kLanes];  // largest of the points, channel by channel
-  float shininess[kLanes];                        // least of Blinn's and Phong's points
+  float exponent[kLanes];                         // least of Blinn's and Phong's points
   float schlick[3][kLanes], grazing[3][kLanes];   // F0 and F90: largest of the GGX points, channel by channel
   float alpha2_low[kLanes], alpha2_high[kLanes];  // least and largest α² of the GGX points
   float view_cosine[kLanes];                      // least cosine of a GGX point's normal to the viewer
-  float fade[kLanes];                             // least of all points
+  float falloff[kLanes];                          // least of all points
   float radius2[kLanes];                          // squared half diagonal of the box
   uint32_t used = 0;                              // bits of the lanes that hold points; the others hold copies
   bool glossy = false, ggx = false;               // any of the points

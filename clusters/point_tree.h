@@ -3,9 +3,9 @@
 
 #include <vector>
 
+#include "bsdf/shade_points.h"
 #include "clusters/pair_bounds.h"
 #include "core/progress.h"
-#include "scene/shade_points.h"
 
 namespace lumicut {
 

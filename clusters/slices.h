@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "bsdf/shade_points.h"
 #include "core/progress.h"
-#include "scene/shade_points.h"
 
 namespace lumicut {
 

@@ -74,15 +74,15 @@ constexpr float kTurn[2][6][2] = {{{0.96592583f, 0.25881905f},
                                    {0.25881905f, -0.96592583f},
                                    {0.96592583f, -0.25881905f}}};
 
-// Mean over the cone of cosθx·cosθl·(1 − fade·(1 − cosθx)⁴), where `facing` is the light's normal turned around. The
+// Mean over the cone of cosθx·cosθl·(1 − falloff·(1 − cosθx)⁴), where `facing` is the light's normal turned around. The
 // rings integrate squares of directions exactly: they and the closed form go over into each other.
-template <bool kFade, bool kCosine>
-HWY_INLINE V MeanOfCosines(D d, const SphereCone& c, const V3& normal, const V3& facing, V fade) {
+template <bool kFalloff, bool kCosine>
+HWY_INLINE V MeanOfCosines(D d, const SphereCone& c, const V3& normal, const V3& facing, V falloff) {
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f);
   const V na = Dot(normal, c.axis), la = kCosine ? Dot(facing, c.axis) : one;
   auto above = LiesAbove(d, c, na);
   if constexpr (kCosine) above = hn::And(above, LiesAbove(d, c, la));
-  if constexpr (kFade) above = hn::And(above, hn::Eq(fade, zero));
+  if constexpr (kFalloff) above = hn::And(above, hn::Eq(falloff, zero));
   if (hn::AllTrue(d, above)) {
     // Means of cos and cos² to the axis.
     const V first = hn::NegMulAdd(half, c.versine, one);
@@ -115,7 +115,7 @@ HWY_INLINE V MeanOfCosines(D d, const SphereCone& c, const V3& normal, const V3&
       V both = cx;
       if constexpr (kCosine)
         both = hn::Mul(cx, hn::Max(zero, hn::MulAdd(cosine, la, hn::MulAdd(x, lt, hn::Mul(y, lb)))));
-      if constexpr (kFade) both = hn::Mul(both, Fading(d, fade, cx));
+      if constexpr (kFalloff) both = hn::Mul(both, DiffuseFalloff(d, falloff, cx));
       of_ring = hn::Add(of_ring, both);
     }
     sum = hn::MulAdd(of_ring, hn::Set(d, kRingWeight[ring] / 6.0f), sum);
@@ -123,16 +123,16 @@ HWY_INLINE V MeanOfCosines(D d, const SphereCone& c, const V3& normal, const V3&
   return sum;
 }
 
-// Means over the cone of lobe·cosθx·cosθl: `specular` and `grazing` of Parts. Rays leave the mirror direction, in the
+// Means over the cone of lobe·cosθx·cosθl: `specular` and `grazing` of LobeSums. Rays leave the mirror direction, in the
 // plane of incidence and across it as GGX's lobe is stretched; along each, places are dense as the lobe is high. The
 // sum is divided by the cone's solid angle, or by what the rays make of it where that is more: a mean of values in the
 // cone, so that bounds over the cone hold for it.
 template <Lobes kLobes, bool kCosine>
-HWY_INLINE void MeanOfLobe(D d, const SphereCone& c, const V3& normal, const V3& facing, const V3& mirror, V shininess,
-                           V& specular, V& grazing) {
+HWY_INLINE void MeanOfLobe(D d, const SphereCone& c, const V3& normal, const V3& facing, const V3& mirror,
+                           const LobeShape& shape, V& specular, V& grazing) {
   constexpr int kRays = 6, kPlaces = 3;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), two = hn::Set(d, 2.0f), tiny = hn::Set(d, 1e-20f);
-  const auto is_ggx = hn::Lt(shininess, zero);
+  const auto is_ggx = shape.is_ggx(d);
   const V nm = Dot(normal, mirror), cos_half = hn::Sub(one, c.versine);
   // From the mirror direction to the axis.
   const V3 apart{hn::Sub(mirror.x, c.axis.x), hn::Sub(mirror.y, c.axis.y), hn::Sub(mirror.z, c.axis.z)};
@@ -184,8 +184,8 @@ HWY_INLINE void MeanOfLobe(D d, const SphereCone& c, const V3& normal, const V3&
   };
   turn(cos_h, sin_h);
 
-  const V width = hn::IfThenElse(is_ggx, hn::Mul(two, hn::Mul(shininess, shininess)),
-                                 hn::Div(two, hn::Add(one, hn::Max(zero, shininess))));
+  const V width = hn::IfThenElse(is_ggx, hn::Mul(two, hn::Mul(shape.alpha, shape.alpha)),
+                                 hn::Div(two, hn::Add(one, shape.exponent)));
   V sum = zero, edge = zero, weight = zero;
   for (int ray = 0; ray < kRays; ++ray, turn(cos_step, sin_step)) {
     const V yc = hn::Mul(y, stretch), norm2 = hn::MulAdd(x, x, hn::Mul(yc, yc));
@@ -227,12 +227,12 @@ HWY_INLINE void MeanOfLobe(D d, const SphereCone& c, const V3& normal, const V3&
       V both = hn::Mul(w, cos_x);
       if constexpr (kCosine) both = hn::Mul(both, hn::Max(zero, Dot(facing, to_light)));
       if constexpr (kLobes == Lobes::cosine) {
-        sum = hn::MulAdd(both, Lobe(d, c_b, shininess), sum);
+        sum = hn::MulAdd(both, CosineLobe(d, c_b, shape.exponent), sum);
       } else {
         V lobe, fresnel;
-        GgxLobe(d, shininess, cos_x, normal, mirror, to_light, lobe, fresnel);
+        GgxLobe(d, shape.alpha, cos_x, normal, mirror, to_light, lobe, fresnel);
         fresnel = hn::IfThenElseZero(is_ggx, fresnel);
-        if (!hn::AllTrue(d, is_ggx)) lobe = hn::IfThenElse(is_ggx, lobe, Lobe(d, c_b, hn::Max(zero, shininess)));
+        if (!hn::AllTrue(d, is_ggx)) lobe = hn::IfThenElse(is_ggx, lobe, CosineLobe(d, c_b, shape.exponent));
         lobe = hn::Mul(lobe, both);
         sum = hn::MulAdd(lobe, hn::Sub(one, fresnel), sum);
         edge = hn::MulAdd(lobe, fresnel, edge);
@@ -246,32 +246,32 @@ HWY_INLINE void MeanOfLobe(D d, const SphereCone& c, const V3& normal, const V3&
 // What a sphere of intensity 1 gives through the parts of a point's reflectance: geometry, cosines and all. `kCosine`
 // false: it shines as brightly to all sides. `axis`: to its centre. [Hašan et al. 2009, Eq. 5]
 template <Lobes kLobes, bool kCosine, class Points>
-HWY_INLINE Parts SphereParts(D d, const Vpl& light, const Points& points, size_t p, const V3& position,
-                             const V3& normal, V3& axis) {
+HWY_INLINE LobeSums SphereLobes(D d, const Vpl& light, const Points& points, size_t p, const V3& position,
+                                const V3& normal, V3& axis) {
   const V zero = hn::Zero(d);
   const SphereCone cone = ConeOfSphere(d, light, position, normal);
   axis = cone.axis;
   const V3 light_normal = Set3(d, light.normal);
   const V3 facing{hn::Neg(light_normal.x), hn::Neg(light_normal.y), hn::Neg(light_normal.z)};
-  Parts parts{zero, zero, zero};
+  LobeSums parts{zero, zero, zero};
   const V na = Dot(normal, axis);
   auto lit = RisesAbove(d, cone, na);
   if constexpr (kCosine) lit = hn::And(lit, RisesAbove(d, cone, Dot(facing, axis)));
   if (hn::AllFalse(d, lit)) return parts;
-  V fade = zero;
-  if constexpr (kLobes == Lobes::ggx) fade = Load1(d, points.fade, p);
-  const V even = MeanOfCosines<kLobes == Lobes::ggx, kCosine>(d, cone, normal, facing, fade);
+  V falloff = zero;
+  if constexpr (kLobes == Lobes::ggx) falloff = Load1(d, points.falloff, p);
+  const V even = MeanOfCosines<kLobes == Lobes::ggx, kCosine>(d, cone, normal, facing, falloff);
   parts.diffuse = hn::IfThenElseZero(lit, hn::Mul(cone.geometry, even));
   if constexpr (kLobes != Lobes::none) {
     const V3 mirror = Load3(d, points.mirror, p);
-    const V shininess = Load1(d, points.shininess, p);
+    const LobeShape shape = LoadShape<kLobes>(d, points, p);
     if (kLobes == Lobes::cosine && hn::AllFalse(d, hn::And(lit, RisesAbove(d, cone, Dot(mirror, axis))))) return parts;
     V specular, grazing;
-    MeanOfLobe<kLobes, kCosine>(d, cone, normal, facing, mirror, shininess, specular, grazing);
+    MeanOfLobe<kLobes, kCosine>(d, cone, normal, facing, mirror, shape, specular, grazing);
     // Where the cone is narrower than rounding resolves, the lobe is that of its axis.
     const auto narrow = hn::Lt(cone.sine2, hn::Set(d, 1e-8f));
     if (!hn::AllFalse(d, narrow)) {
-      const Parts at = PartsTowards<kLobes>(d, points, p, normal, mirror, shininess, axis);
+      const LobeSums at = LobesTowards<kLobes>(d, points, p, normal, mirror, shape, axis);
       V both = hn::Max(zero, na);
       if constexpr (kCosine) both = hn::Mul(both, hn::Max(zero, Dot(facing, axis)));
       specular = hn::IfThenElse(narrow, hn::Mul(both, at.specular), specular);
@@ -287,7 +287,7 @@ HWY_INLINE Parts SphereParts(D d, const Vpl& light, const Points& points, size_t
 template <Lobes kLobes, bool kCosine, class Points>
 HWY_INLINE V3 SphereRadiance(D d, const Vpl& light, const Points& points, size_t p, const V3& position,
                              const V3& normal, V3& axis) {
-  const Parts parts = SphereParts<kLobes, kCosine>(d, light, points, p, position, normal, axis);
+  const LobeSums parts = SphereLobes<kLobes, kCosine>(d, light, points, p, position, normal, axis);
   const V3 diffuse = Load3(d, points.diffuse, p);
   V3 f{hn::Mul(diffuse.x, parts.diffuse), hn::Mul(diffuse.y, parts.diffuse), hn::Mul(diffuse.z, parts.diffuse)};
   const auto add = [&f](const V3& color, V part) {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "accel/accel.h"
-#include "scene/shade_points.h"
+#include "bsdf/shade_points.h"
 
 namespace lumicut {
 

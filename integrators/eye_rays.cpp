@@ -1,7 +1,7 @@
 #include "integrators/eye_rays.h"
 
 #include "clusters/light_kernel.h"
-#include "scene/bsdf.h"
+#include "core/sampling.h"
 #include "scene/place_rng.h"
 
 namespace lumicut {
@@ -39,7 +39,7 @@ void EyeRays::near_mesh(const SurfacePoint& point, Rng& rng, std::vector<Ray>& s
   ray.org = point.position, ray.dir = v + s.vpl.normal * scene_.epsilon();
   ray.tnear = 0.0f, ray.tfar = 1.0f;
   shadows.push_back(ray);
-  hits.add(lost * mis_weight(s.density * d2 / cosine, Bsdf(point).pdf(to_light)), point.pixel, s.vpl.group);
+  hits.add(lost * power_heuristic(s.density * d2 / cosine, PointBsdf(point).pdf(to_light)), point.pixel, s.vpl.group);
 }
 
 EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, const Progress& progress, Counters& counters) const {
@@ -58,12 +58,12 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, const Progress
     if (!lamps_.empty()) near_lamps(point, rng, shadows, hits);
     if (emitters_.has_meshes()) near_mesh(point, rng, shadows, hits);
     const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float();
-    const BsdfSample s = Bsdf(point).sample(choice, u, v);
-    if (!(s.pdf > 0.0f) || !is_finite(s.weight)) continue;
+    const auto s = PointBsdf(point).sample(choice, u, v);
+    if (!s || !is_finite(s->weight)) continue;
     RayHit ray;
-    ray.ray.org = point.position, ray.ray.dir = s.direction;
-    rays.push_back(ray), weights.push_back(s.weight), pixels.push_back(point.pixel), rngs.push_back(rng),
-        pdfs.push_back(s.pdf);
+    ray.ray.org = point.position, ray.ray.dir = s->direction;
+    rays.push_back(ray), weights.push_back(s->weight), pixels.push_back(point.pixel), rngs.push_back(rng),
+        pdfs.push_back(s->pdf);
   }
   if (!shadows.empty()) {
     trace_in_parts(std::span(shadows), progress, [&](std::span<Ray> part) { scene_.accel().occluded(part); });
@@ -79,38 +79,33 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, const Progress
           rays[i].ray.org, rays[i].ray.dir, std::min(rays[i].ray.tfar, distance_), [&](const LampSurfaces::Hit& lamp) {
             const float share = lamp.t / distance_;
             const double density = double{lamp.t} * lamp.t / (double{lamp.cosine} * lamp.area);
-            hits.add(weights[i] * lamp.radiance * ((1.0f - share * share) * mis_weight(pdfs[i], density)), pixels[i],
-                     scene_.lights()[lamp.lamp].group);
+            hits.add(weights[i] * lamp.radiance * ((1.0f - share * share) * power_heuristic(pdfs[i], density)),
+                     pixels[i], scene_.lights()[lamp.lamp].group);
           });
     // A ray that meets its own surface at once left it below the horizon of the triangle.
     if (rays[i].hit.geom == kNoId || rays[i].ray.tfar < 4.0f * scene_.epsilon()) continue;
-    const SurfaceHit surface = scene_.surface(rays[i]);
-    const Vec3f to_viewer = -rays[i].ray.dir;
+    const SurfaceInteraction at = scene_.interaction(rays[i], pixels[i]);
     const float share = rays[i].ray.tfar / distance_, lost = std::max(0.0f, 1.0f - share * share);
     if (lost > 0.0f) {
-      const Rgb emitted = scene_.emitted(surface, to_viewer);
-      if (max_component(emitted) > 0.0f) {
-        const double cosine = std::max(1e-9f, std::abs(dot(surface.geometric_normal, to_viewer)));
-        const double density = emitters_.mesh_density(surface) * double{surface.t} * surface.t / cosine;
-        hits.add(emitted * weights[i] * (lost * mis_weight(pdfs[i], density)), pixels[i],
-                 scene_.meshes()[surface.mesh].group);
+      if (max_component(at.emitted) > 0.0f) {
+        const double cosine = std::max(1e-9f, std::abs(dot(at.geometric_normal, at.to_viewer)));
+        const double density = emitters_.mesh_density(at) * double{at.t} * at.t / cosine;
+        hits.add(at.emitted * weights[i] * (lost * power_heuristic(pdfs[i], density)), pixels[i],
+                 scene_.meshes()[at.mesh].group);
       }
     }
     // Mirrors and glass show it what is behind them: no virtual light shines by way of those.
-    if (auto ray = start_chain(scene_, surface, to_viewer, weights[i], pixels[i], rngs[i])) chains.push_back(*ray);
-    SurfacePoint point = scene_.shade_point(surface, to_viewer, pixels[i]);
-    // Spheres stand for all that is reflected evenly.
-    point.diffuse = point.diffuse * (spheres_ ? 0.0f : lost);
-    // Chance decides by what the surface still shows, so that few points cost a whole sum of lights.
-    const auto add = [&](SurfacePoint& found) {
-      const Rgb shown = Bsdf(found).albedo() * weights[i];
+    if (auto ray = start_chain(at.bsdf, weights[i], pixels[i], rngs[i])) chains.push_back(*ray);
+    for (SurfacePoint point : at.bsdf.layers()) {
+      // Spheres stand for all that is reflected evenly.
+      point.diffuse = point.diffuse * (spheres_ ? 0.0f : lost);
+      // Chance decides by what the surface still shows, so that few points cost a whole sum of lights.
+      const Rgb shown = PointBsdf(point).albedo() * weights[i];
       const float survive = std::min(1.0f, max_component(shown));
-      if (!(rngs[i].next_float() < survive)) return;
-      found.attenuate(weights[i] / survive);
-      hits.found.push_back(found);
-    };
-    add(point);
-    if (auto coat = scene_.coat_point(surface, to_viewer, pixels[i])) add(*coat);
+      if (!(rngs[i].next_float() < survive)) continue;
+      point.attenuate(weights[i] / survive);
+      hits.found.push_back(point);
+    }
   }
   follow_chains(scene_, lamp_surfaces_, std::move(chains), progress, hits, counters);
   return hits;

@@ -6,8 +6,8 @@
 #include <memory>
 
 #include "core/stats.h"
-#include "integrators/followed_chain.h"
 #include "integrators/near_lamps.h"
+#include "integrators/specular_chain.h"
 #include "scene/scene.h"
 #include "vpl/lamp_surfaces.h"
 

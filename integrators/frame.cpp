@@ -45,7 +45,7 @@ struct PixelSums {
 
 class Batch {
  public:
-  // `lamps`: where anything of the scene is followed.
+  // `lamps`: where anything of the scene may be specular.
   Batch(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options,
         const LampSurfaces* lamps)
       : scene_(scene), methods_(methods), options_(options), lamps_(lamps) {}
@@ -80,11 +80,16 @@ class Batch {
       for (size_t i = 0; i < rays.size(); ++i) {
         const size_t p = begin + i / samples;
         const size_t at = begin * samples + i;
-        hit[at] = first_hit(rays[i], p, cosines[i], found[at]);
-        if (hit[at] == 0) continue;
-        if (!coats.empty())
-          coats[at] = scene_.coat_point(scene_.surface(rays[i]), -rays[i].ray.dir, static_cast<uint32_t>(p));
-        if (lamps_ != nullptr) chain[at] = mirrored(rays[i], p, i % samples);
+        if (rays[i].hit.geom == kNoId) {
+          miss(rays[i], p);
+          continue;
+        }
+        const SurfaceInteraction seen = scene_.interaction(rays[i], static_cast<uint32_t>(p));
+        first_hit(seen, p, cosines[i]);
+        const auto layers = seen.bsdf.layers();
+        hit[at] = 1, found[at] = layers[0];
+        if (layers.size() > 1) coats[at] = layers[1];
+        if (seen.bsdf.is_specular()) chain[at] = start_chain_of(seen.bsdf, p, i % samples);
       }
     });
     context.progress.check();
@@ -122,7 +127,7 @@ class Batch {
       if (!coat_.empty() && coat_[i]) continue;  // its place has a point of its own
       SurfacePoint point = points_.get(i);
       point.diffuse = Rgb{1, 1, 1} * std::numbers::inv_pi_v<float>, point.specular = point.grazing = {};
-      point.shininess = point.fade = 0.0f;
+      point.exponent = point.falloff = point.alpha = 0.0f;
       white.push(point);
     }
     white.finish();
@@ -237,32 +242,25 @@ class Batch {
     sum.seen.emplace_back(group, radiance);
   }
 
-  // What the ray found, into the sums of pixel p; false: nothing to shade.
-  bool first_hit(const RayHit& ray, size_t p, float cosine, SurfacePoint& point) {
-    const Vec3f to_viewer = -ray.ray.dir;
-    PixelSums& sum = sums_[p];
-    if (ray.hit.geom == kNoId) {
-      if (!scene_.environment().hidden) see(sum, scene_.environment().group, scene_.environment_radiance(ray.ray.dir));
-      return false;
-    }
-    const SurfaceHit surface = scene_.surface(ray);
-    point = scene_.shade_point(surface, to_viewer, static_cast<uint32_t>(p));
-    see(sum, scene_.meshes()[surface.mesh].group, scene_.emitted(surface, to_viewer));
-    sum.normal += point.normal;
-    sum.albedo +=
-        min(scene_.diffuse_color(surface.material, surface.uv) + scene_.specular_color(surface.material, surface.uv),
-            Rgb{1, 1, 1});
-    if (sum.hits == 0.0f) sum.position = surface.position, sum.depth = surface.t * cosine;
-    sum.hits += 1.0f;
-    return true;
+  void miss(const RayHit& ray, size_t p) {
+    if (!scene_.environment().hidden)
+      see(sums_[p], scene_.environment().group, scene_.environment_radiance(ray.ray.dir));
   }
 
-  // What a mirror or glass there goes on to show.
-  std::optional<ChainRay> mirrored(const RayHit& ray, size_t p, size_t sample) const {
-    const SurfaceHit surface = scene_.surface(ray);
-    if (!scene_.followed(surface)) return {};
+  // Into the sums of pixel p.
+  void first_hit(const SurfaceInteraction& at, size_t p, float cosine) {
+    PixelSums& sum = sums_[p];
+    see(sum, scene_.meshes()[at.mesh].group, at.emitted);
+    sum.normal += at.bsdf.normal();
+    sum.albedo += at.bsdf.albedo();
+    if (sum.hits == 0.0f) sum.position = at.position, sum.depth = at.t * cosine;
+    sum.hits += 1.0f;
+  }
+
+  // What a mirror or glass goes on to show.
+  std::optional<ChainRay> start_chain_of(const Bsdf& bsdf, size_t p, size_t sample) const {
     const auto [x, y] = pixels_[p];
-    return start_chain(scene_, surface, -ray.ray.dir, {1, 1, 1}, static_cast<uint32_t>(p),
+    return start_chain(bsdf, {1, 1, 1}, static_cast<uint32_t>(p),
                        Rng(hash64(options_.seed, sample), Stage::eye_ray, x, y));
   }
 
@@ -332,8 +330,7 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
     first = last;
   }
   std::optional<LampSurfaces> lamps;
-  if (std::any_of(scene.materials().begin(), scene.materials().end(), [](const Material& m) { return m.followed(); }))
-    lamps.emplace(scene);
+  if (scene.may_be_specular()) lamps.emplace(scene);
   std::optional<EyeRays> eye_rays;
   if (options.compensate > 0.0f)
     eye_rays.emplace(scene, options.compensate, options.spheres, options.seed, context.progress);

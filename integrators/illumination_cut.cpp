@@ -8,6 +8,7 @@
 #include <bit>
 #include <memory>
 
+#include "bsdf/point_bsdf.h"
 #include "clusters/bounds.h"
 #include "clusters/light_kernel.h"
 #include "clusters/light_tree.h"
@@ -16,7 +17,6 @@
 #include "core/parallel.h"
 #include "core/rng.h"
 #include "integrators/integrator.h"
-#include "scene/bsdf.h"
 
 namespace lumicut {
 
@@ -43,7 +43,7 @@ struct GroupItem {
 // Share of the light that a surface sends back, to first order: what turns irradiance into radiance.
 float reflectance(const SurfacePoint& p) {
   const float specular = p.ggx() ? luminance(specular_albedo(p)) * std::numbers::inv_pi_v<float>
-                                 : luminance(p.specular) * (2.0f / (p.shininess + 1.0f));
+                                 : luminance(p.specular) * (2.0f / (p.exponent + 1.0f));
   return luminance(p.diffuse) + specular;
 }
 

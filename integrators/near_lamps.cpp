@@ -1,8 +1,9 @@
 #include "integrators/near_lamps.h"
 
+#include "bsdf/point_bsdf.h"
+#include "core/sampling.h"
 #include "clusters/light_kernel.h"
 #include "core/rng.h"
-#include "scene/bsdf.h"
 #include "vpl/lamp_surfaces.h"
 
 namespace lumicut {
@@ -68,7 +69,7 @@ Rgb NearLamps::lost_light(uint32_t lamp, const Vpl& vpl, const SurfacePoint& poi
   if (LampSurfaces::has(light) && max_component(lost) > 0.0f) {
     const Vec3f to_light = normalize(vpl.position - point.position);
     const double cosine = std::max(1e-9f, -dot(vpl.normal, to_light));
-    lost = lost * mis_weight(d2 / (cosine * LampSurfaces::area(light)), Bsdf(point).pdf(to_light));
+    lost = lost * power_heuristic(d2 / (cosine * LampSurfaces::area(light)), PointBsdf(point).pdf(to_light));
   }
   return lost;
 }

@@ -5,8 +5,8 @@
 #include <unordered_map>
 #include <vector>
 
+#include "bsdf/shade_points.h"
 #include "core/progress.h"
-#include "scene/shade_points.h"
 #include "vpl/emitters.h"
 
 namespace lumicut {

@@ -4,10 +4,10 @@
 
 #include "clusters/light_kernel.h"
 #include "core/parallel.h"
+#include "core/sampling.h"
 #include "integrators/integrator.h"
-#include "scene/bsdf.h"
-#include "scene/followed.h"
 #include "scene/place_rng.h"
+#include "scene/scene.h"
 #include "vpl/emitters.h"
 #include "vpl/lamp_surfaces.h"
 
@@ -67,7 +67,7 @@ class PathTracer final : public Integrator {
     Vec3f direction{};
     Rgb weight{};
     float pdf = 0.0f;
-    bool followed = false;  // by way of a mirror or glass, from `origin`: nothing else finds what it finds
+    bool specular = false;  // along a specular lobe, from `origin`: nothing else finds what it finds
     Vec3f origin{};
   };
   struct Shadow {
@@ -87,7 +87,7 @@ class PathTracer final : public Integrator {
       size_t alive = 0;
       for (size_t i = 0; i < paths.size(); ++i) {
         Path path = paths[i];
-        if (path.followed) {
+        if (path.specular) {
           RayHit ray;
           ray.ray.org = path.origin, ray.ray.dir = path.direction;
           rays.push_back(ray);
@@ -96,11 +96,11 @@ class PathTracer final : public Integrator {
         }
         sample_lights(path, shadow_rays, shadows);
         const float choice = path.rng.next_float(), u = path.rng.next_float(), v = path.rng.next_float();
-        const BsdfSample s = Bsdf(path.point).sample(choice, u, v);
-        if (!(s.pdf > 0.0f) || !is_finite(s.weight)) continue;
-        path.direction = s.direction, path.weight = s.weight, path.pdf = s.pdf;
+        const auto s = PointBsdf(path.point).sample(choice, u, v);
+        if (!s || !is_finite(s->weight)) continue;
+        path.direction = s->direction, path.weight = s->weight, path.pdf = s->pdf;
         RayHit ray;
-        ray.ray.org = path.point.position, ray.ray.dir = s.direction;
+        ray.ray.org = path.point.position, ray.ray.dir = s->direction;
         rays.push_back(ray);
         paths[alive++] = path;
       }
@@ -138,7 +138,7 @@ class PathTracer final : public Integrator {
       const Vec3f to_light = normalize(v);
       const double cosine = far ? 1.0 : std::max(1e-9f, -dot(s.vpl.normal, to_light));
       const double density = far ? s.density : s.density * length2(v) / cosine;
-      light = light * mis_weight(density, Bsdf(path.point).pdf(to_light));
+      light = light * power_heuristic(density, PointBsdf(path.point).pdf(to_light));
     }
     add_shadow(path, s.vpl, light, rays, shadows);
   }
@@ -166,53 +166,35 @@ class PathTracer final : public Integrator {
     if (!lamps_->empty())
       lamps_->for_each_hit(hit.ray.org, path.direction, hit.ray.tfar, [&](const LampSurfaces::Hit& lamp) {
         const double density = emitters_->lamp_density(lamp.lamp) * double{lamp.t} * lamp.t / lamp.cosine;
-        sum += path.weight * lamp.radiance * (path.followed ? 1.0f : mis_weight(path.pdf, density));
+        sum += path.weight * lamp.radiance * (path.specular ? 1.0f : power_heuristic(path.pdf, density));
       });
     if (hit.hit.geom == kNoId) {
       const Rgb light = scene_->environment_radiance(path.direction);
       if (max_component(light) > 0.0f)
         sum += path.weight * light *
-               (path.followed ? 1.0f : mis_weight(path.pdf, emitters_->environment_density(path.direction)));
+               (path.specular ? 1.0f : power_heuristic(path.pdf, emitters_->environment_density(path.direction)));
       return false;
     }
     // A ray that meets its own surface at once left it below the horizon of the triangle.
-    if (!path.followed && hit.ray.tfar < 4.0f * scene_->epsilon()) return false;
-    const SurfaceHit surface = scene_->surface(hit);
-    const Vec3f to_viewer = -path.direction;
-    const Rgb emitted = scene_->emitted(surface, to_viewer);
-    if (max_component(emitted) > 0.0f) {
-      const double cosine = std::max(1e-9f, std::abs(dot(surface.geometric_normal, to_viewer)));
-      const double density = emitters_->mesh_density(surface) * double{surface.t} * surface.t / cosine;
-      sum += path.weight * emitted * (path.followed ? 1.0f : mis_weight(path.pdf, density));
+    if (!path.specular && hit.ray.tfar < 4.0f * scene_->epsilon()) return false;
+    const SurfaceInteraction at = scene_->interaction(hit, path.point.pixel);
+    if (max_component(at.emitted) > 0.0f) {
+      const double cosine = std::max(1e-9f, std::abs(dot(at.geometric_normal, at.to_viewer)));
+      const double density = emitters_->mesh_density(at) * double{at.t} * at.t / cosine;
+      sum += path.weight * at.emitted * (path.specular ? 1.0f : power_heuristic(path.pdf, density));
     }
     if (depth >= max_depth_) return false;
-    path.point = scene_->shade_point(surface, to_viewer, path.point.pixel);
-    Rgb factor = path.weight;
-    path.followed = false;
-    auto coat = scene_->coat_point(surface, to_viewer, path.point.pixel);
-    if (scene_->followed(surface)) {
-      const float choice = path.rng.next_float(), u = path.rng.next_float(), v = path.rng.next_float();
-      const float either = path.rng.next_float();
-      const auto f = lumicut::follow(*scene_, surface, to_viewer, choice, u, v);
-      // Half of the paths each way, where there are two.
-      const float share = Bsdf(path.point).black() && !coat ? 1.0f : 0.5f;
-      if (either < share) {
-        if (!f) return false;
-        path.followed = true;
-        path.origin = f->origin, path.direction = f->direction;
-        path.weight = factor * f->weight / share;
-        return survives(path, depth, path.weight, path.weight);
-      }
-      factor = factor / (1.0f - share);
+    const PathChoice choice = at.bsdf.choose(path.rng);
+    path.specular = choice.specular.has_value();
+    if (choice.specular) {
+      path.origin = at.bsdf.origin(choice.specular->flags), path.direction = choice.specular->direction;
+      path.weight = path.weight * choice.specular->weight / choice.probability;
+      return survives(path, depth, path.weight, path.weight);
     }
-    if (coat) {  // the coat's lobe or what is beneath, by what they reflect
-      const float above = max_component(Bsdf(*coat).albedo()), below = max_component(Bsdf(path.point).albedo());
-      const float share = above / (above + below);
-      const bool chosen = path.rng.next_float() < share;
-      if (chosen) path.point = *coat;
-      factor = factor / (chosen ? share : 1.0f - share);
-    }
-    if (!survives(path, depth, Bsdf(path.point).albedo() * factor, factor)) return false;
+    if (choice.layer == nullptr) return false;
+    path.point = *choice.layer;
+    Rgb factor = path.weight / choice.probability;
+    if (!survives(path, depth, PointBsdf(path.point).albedo() * factor, factor)) return false;
     path.point.attenuate(factor);
     return true;
   }

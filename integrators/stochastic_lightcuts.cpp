@@ -7,13 +7,13 @@
 //   docs/decisions/stochastic-lightcuts-descent.md
 #include <memory>
 
+#include "bsdf/point_bsdf.h"
 #include "clusters/bounds.h"
 #include "clusters/light_kernel.h"
 #include "clusters/light_tree.h"
 #include "core/parallel.h"
 #include "core/rng.h"
 #include "integrators/integrator.h"
-#include "scene/bsdf.h"
 #include "scene/place_rng.h"
 
 namespace lumicut {
@@ -213,10 +213,10 @@ class StochasticLightcuts final : public Integrator {
     if (const float specular = luminance(point.specular); point.ggx()) {
       const float nv = dot(point.normal, point.mirror);
       reflected +=
-          luminance(specular_albedo(point)) * ggx_lobe_bound(-point.shininess, nv, cosine, best_cosine(point.mirror));
+          luminance(specular_albedo(point)) * ggx_lobe_bound(point.alpha, nv, cosine, best_cosine(point.mirror));
     } else if (specular > 0.0f) {
       const float beta = best_cosine(point.mirror);
-      if (beta > 0.0f) reflected += specular * std::pow(beta, point.shininess);
+      if (beta > 0.0f) reflected += specular * std::pow(beta, point.exponent);
     }
     float emitted = 1.0f;
     if ((node.kind == VplKind::oriented || node.kind == VplKind::sphere) && distance > radius) {

@@ -454,9 +454,9 @@ std::vector<uint64_t> append_points(const Scene& scene, const lumicut_point* poi
     const Vec3f position = vec(p.position), geometric = normalize(vec(p.geometric_normal)),
                 normal = normalize(vec(p.normal)), to_viewer = normalize(vec(p.to_viewer));
     if (scene.coated()) starts.push_back(out.size());
-    out.push(scene.shade_point(position, geometric, normal, {p.u, p.v}, p.material, to_viewer, p.pixel));
-    if (const auto coat = scene.coat_point(position, geometric, normal, p.material, to_viewer, p.pixel))
-      out.push(*coat);
+    const Bsdf bsdf =
+        scene.bsdf({position, geometric, normal, to_viewer, scene.epsilon(), p.pixel}, p.material, {p.u, p.v});
+    for (const SurfacePoint& point : bsdf.layers()) out.push(point);
   }
   return starts;
 }

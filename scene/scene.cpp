@@ -331,131 +331,40 @@ Vec3f Scene::mapped_normal(const Material& material, const SurfaceHit& hit, cons
   return n == Vec3f{} ? hit.normal : n;
 }
 
-SurfacePoint Scene::shade_point(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const {
-  return shade_point(hit.position, hit.geometric_normal, hit.normal, hit.uv, hit.material, to_viewer, pixel);
+SurfaceInteraction Scene::interaction(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const {
+  SurfaceInteraction i;
+  static_cast<SurfaceHit&>(i) = hit;
+  i.to_viewer = to_viewer;
+  i.emitted = emitted(hit, to_viewer);
+  i.bsdf = bsdf({hit.position, hit.geometric_normal, hit.normal, to_viewer, epsilon_, pixel}, hit.material, hit.uv);
+  return i;
 }
 
-SurfacePoint Scene::shade_point(const Vec3f& position, const Vec3f& geometric_normal, const Vec3f& normal, Vec2f uv,
-                                uint32_t material_index, const Vec3f& to_viewer, uint32_t pixel) const {
-  const Material& material = materials_[material_index];
-  const bool behind = dot(geometric_normal, to_viewer) < 0.0f;  // two-sided: scenes are wound as they are
-  SurfacePoint p;
-  p.position = position + geometric_normal * (behind ? -epsilon_ : epsilon_);
-  p.normal = behind ? -normal : normal;
-  p.pixel = pixel;
-  if (material.lobe == LobeModel::ggx) {
-    set_ggx(material, ggx_colors(material_index, uv), to_viewer, p);
-    return p;
-  }
-  p.mirror = normalize(reflect(to_viewer, p.normal));
-  p.diffuse = diffuse_texel(material, uv) * kInvPi;
-  p.specular = specular_texel(material, uv) * lobe_scale(material.lobe == LobeModel::phong, material.shininess);
-  p.shininess = material.shininess;
-  return p;
-}
-
-namespace {
-// Sets what the view direction is mirrored to; its cosine. Bent shading normals may turn from the viewer: seen edge-on
-// then.
-float set_mirror(const Vec3f& to_viewer, SurfacePoint& p) {
-  constexpr float kEdge = 0.01f;
-  float cosine = dot(p.normal, to_viewer);
-  Vec3f view = to_viewer;
-  if (cosine < kEdge) view = normalize(view + p.normal * (kEdge - cosine)), cosine = kEdge;
-  p.mirror = normalize(reflect(view, p.normal));
-  return cosine;
-}
-}  // namespace
-
-void Scene::set_ggx(const Material& material, const GgxColors& colors, const Vec3f& to_viewer, SurfacePoint& p) const {
-  const float cosine = set_mirror(to_viewer, p);
-  const GgxBase base = ggx_base(colors, cosine);
-  p.diffuse = base.scale * kInvPi;
-  p.fade = base.fade;
-  p.shininess = -std::max(kLeastAlpha, colors.alpha);
-  if (colors.alpha >= kLeastAlpha) p.specular = colors.specular, p.grazing = colors.grazing;
-  if (!(material.coat > 0.0f)) return;
-  // The diffuse part gets what the coat leaves of the light's directions on the average, the lobe what it leaves of the
-  // view's: that of the light too, where the lobe is a mirror's.
-  const LobeRest rest = clear_coat(material).rest;
-  const float shown = rest.at(cosine);
-  p.fade = product_fade(base.fade, rest.fade);
-  p.diffuse *= shown * mean_of_fading(base.fade) / mean_of_fading(p.fade);
-  p.specular *= shown, p.grazing *= shown;
-}
-
-std::optional<SurfacePoint> Scene::coat_point(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const {
-  return coat_point(hit.position, hit.geometric_normal, hit.normal, hit.material, to_viewer, pixel);
-}
-
-std::optional<SurfacePoint> Scene::coat_point(const Vec3f& position, const Vec3f& geometric_normal, const Vec3f& normal,
-                                              uint32_t material_index, const Vec3f& to_viewer, uint32_t pixel) const {
-  const Material& material = materials_[material_index];
-  if (!material.rough_coat()) return {};
-  const bool behind = dot(geometric_normal, to_viewer) < 0.0f;
-  SurfacePoint p;
-  p.position = position + geometric_normal * (behind ? -epsilon_ : epsilon_);
-  p.normal = behind ? -normal : normal;
-  p.pixel = pixel;
-  set_mirror(to_viewer, p);
-  const ClearCoat coat = clear_coat(material);
-  p.shininess = -material.coat_alpha();
-  p.specular = Rgb{1, 1, 1} * coat.f0, p.grazing = Rgb{1, 1, 1} * coat.f90;
-  return p;
-}
-
-bool Scene::followed(const SurfaceHit& hit) const {
-  const Material& m = materials_[hit.material];
-  return m.followed() && (m.smooth_coat() || ggx_colors(hit.material, hit.uv).followed());
-}
-
-Rgb Scene::diffuse_texel(const Material& m, Vec2f uv) const {
-  return m.diffuse_texture < 0 ? m.diffuse : m.diffuse * textures_[m.diffuse_texture].color(uv.x, uv.y);
-}
-
-Rgb Scene::specular_texel(const Material& m, Vec2f uv) const {
-  return m.specular_texture < 0 ? m.specular : m.specular * textures_[m.specular_texture].color(uv.x, uv.y);
-}
-
-Rgb Scene::diffuse_color(uint32_t material, Vec2f uv) const {
+BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv) const {
   const Material& m = materials_[material];
-  const Rgb color = diffuse_texel(m, uv);
-  return m.lobe == LobeModel::ggx ? color * ((1.0f - metallic_of(m, uv)) * (1.0f - m.transmission)) : color;
-}
-
-Rgb Scene::specular_color(uint32_t material, Vec2f uv) const {
-  const Material& m = materials_[material];
-  return m.lobe == LobeModel::ggx ? ggx_colors(material, uv).specular : specular_texel(m, uv);
-}
-
-float Scene::metallic_of(const Material& m, Vec2f uv) const {
-  if (m.metallic_texture < 0) return m.metallic;
-  return std::min(1.0f, std::max(0.0f, m.metallic * textures_[m.metallic_texture].color(uv.x, uv.y).z));
-}
-
-GgxColors Scene::ggx_colors(uint32_t material, Vec2f uv) const {
-  const Material& m = materials_[material];
-  GgxColors c{};
-  c.base = diffuse_texel(m, uv);
-  c.metal = metallic_of(m, uv);
-  c.clear = (1.0f - c.metal) * m.transmission;
-  c.opaque = (1.0f - c.metal) * (1.0f - m.transmission);
+  const auto texel = [&](const Rgb& factor, int32_t texture) {
+    return texture < 0 ? factor : factor * textures_[texture].color(uv.x, uv.y);
+  };
+  const auto share = [](float x) { return std::min(1.0f, std::max(0.0f, x)); };
+  BsdfParameters p;
+  p.model = m.lobe;
+  p.diffuse = texel(m.diffuse, m.diffuse_texture), p.specular = texel(m.specular, m.specular_texture);
+  p.exponent = m.shininess;
+  if (m.lobe != LobeModel::ggx) return p;
+  p.fresnel = m.fresnel;
   float roughness = m.roughness;
-  if (m.roughness_texture >= 0)
-    roughness *= std::min(1.0f, std::max(0.0f, textures_[m.roughness_texture].color(uv.x, uv.y).y));
-  c.alpha = roughness * roughness;
-  if (!m.fresnel) {
-    c.metal = c.clear = 0.0f, c.opaque = 1.0f;
-    c.specular = c.grazing = specular_texel(m, uv);
-    return c;
-  }
-  const float r = (m.ior - 1.0f) / (m.ior + 1.0f);
-  c.f0 = specular_texel(m, uv) * (r * r);
-  c.specular = c.base * c.metal + c.f0 * c.opaque;
-  // What hardly reflects has no bright edge either.
-  const auto edge = [](const Rgb& f0) { return std::min(1.0f, 50.0f * max_component(f0)); };
-  c.grazing = Rgb{1, 1, 1} * (edge(c.base) * c.metal + edge(c.f0) * c.opaque);
-  return c;
+  if (m.roughness_texture >= 0) roughness *= share(textures_[m.roughness_texture].color(uv.x, uv.y).y);
+  p.alpha = roughness * roughness;
+  p.metallic = m.metallic;
+  if (m.metallic_texture >= 0) p.metallic = share(p.metallic * textures_[m.metallic_texture].color(uv.x, uv.y).z);
+  p.ior = m.ior, p.transmission = m.transmission;
+  p.coat = m.coat, p.coat_alpha = m.coat_alpha(), p.coat_ior = m.coat_ior;
+  p.glass = glass_[material].get();
+  return p;
+}
+
+bool Scene::may_be_specular() const {
+  return std::any_of(materials_.begin(), materials_.end(), [](const Material& m) { return m.may_be_specular(); });
 }
 
 Rgb Scene::emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const {

@@ -11,10 +11,9 @@
 #include "accel/accel.h"
 #include "core/fields.h"
 #include "scene/camera.h"
-#include "scene/facet_albedo.h"
 #include "scene/light.h"
 #include "scene/material.h"
-#include "scene/shade_points.h"
+#include "scene/surface_interaction.h"
 #include "scene/texture.h"
 
 namespace lumicut {
@@ -35,16 +34,6 @@ struct Mesh {
   uint32_t material_of(uint32_t triangle) const {
     return triangle_materials.empty() ? material : triangle_materials[triangle];
   }
-};
-
-// A hit made whole: world space.
-struct SurfaceHit {
-  Vec3f position;          // on the surface
-  Vec3f geometric_normal;  // unit, the mesh's front side
-  Vec3f normal;            // unit shading normal, on the geometric normal's side
-  Vec2f uv;
-  uint32_t material = 0, mesh = 0, triangle = 0;
-  float t = 0.0f;
 };
 
 class Scene final : private HitFilter {
@@ -120,29 +109,23 @@ class Scene final : private HitFilter {
     return instanced_ ? first_instance_[mesh] + index : kNoId;
   }
 
-  // Makes a hit of `accel()` whole. Normal maps turn its shading normal; a host's own points bring theirs.
+  // Geometry of a hit of `accel()`. Normal maps turn its shading normal; a host's own points bring theirs.
   SurfaceHit surface(const RayHit& hit) const;
-  // The point to shade at a surface seen from direction `to_viewer` (unit, away from the surface).
-  SurfacePoint shade_point(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const;
-  // The same for a host's own point. `material` must be in range (checked by the caller).
-  SurfacePoint shade_point(const Vec3f& position, const Vec3f& geometric_normal, const Vec3f& normal, Vec2f uv,
-                           uint32_t material, const Vec3f& to_viewer, uint32_t pixel) const;
-  // Above the point to shade: the lobe of a rough clear coat. What the surface shows is the sum of both.
-  std::optional<SurfacePoint> coat_point(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const;
-  std::optional<SurfacePoint> coat_point(const Vec3f& position, const Vec3f& geometric_normal, const Vec3f& normal,
-                                         uint32_t material, const Vec3f& to_viewer, uint32_t pixel) const;
-  // Whether any material has a rough clear coat.
-  bool coated() const { return coated_; }
-  // Whether paths follow a lobe of that place (scene/followed.h).
-  bool followed(const SurfaceHit& hit) const;
-  // kd and ks; of GGX materials what is diffuse beneath the coat, and F0 of metal and coat.
-  Rgb diffuse_color(uint32_t material, Vec2f uv) const;
-  Rgb specular_color(uint32_t material, Vec2f uv) const;
-  GgxColors ggx_colors(uint32_t material, Vec2f uv) const;
-  // Share of the light that single reflection and refraction at glass keep. (scene/facet_albedo.h)
-  float glass_albedo(uint32_t material, bool inside, float alpha, float cosine) const {
-    return glass_[material] ? glass_[material]->at(inside, alpha, cosine) : 1.0f;
+  // All of a hit, seen along its ray.
+  SurfaceInteraction interaction(const RayHit& hit, uint32_t pixel = 0) const {
+    return interaction(surface(hit), -hit.ray.dir, pixel);
   }
+  SurfaceInteraction interaction(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel = 0) const;
+  // How a place scatters light: of a host's own point too. `material` must be in range (checked by the caller).
+  Bsdf bsdf(const SurfaceView& view, uint32_t material, Vec2f uv) const {
+    return {bsdf_parameters(material, uv), view};
+  }
+  // The material's description there, its textures looked up.
+  BsdfParameters bsdf_parameters(uint32_t material, Vec2f uv) const;
+  // Whether any material has a rough clear coat: points may have two layers.
+  bool coated() const { return coated_; }
+  // Whether any material may have a specular lobe.
+  bool may_be_specular() const;
   // Radiance emitted by a surface towards `to_viewer`.
   Rgb emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const;
   // Share of rays that a place of a triangle stops: factor times mask.
@@ -160,10 +143,6 @@ class Scene final : private HitFilter {
                       const Vec2f (&corners)[3]) const;
   Vec3f bumped_normal(const Material& material, const Vec3f& normal, Vec2f uv, const Vec3f& along_u,
                       const Vec3f& along_v) const;
-  Rgb diffuse_texel(const Material& material, Vec2f uv) const;
-  Rgb specular_texel(const Material& material, Vec2f uv) const;
-  void set_ggx(const Material& material, const GgxColors& colors, const Vec3f& to_viewer, SurfacePoint& point) const;
-  float metallic_of(const Material& material, Vec2f uv) const;
   bool passes(uint32_t mesh, uint32_t prim, float u, float v) const override;
   void check_references() const;
 

@@ -3,10 +3,7 @@
 // by the number of VPLs, as some codes do, halves the indirect light of a closed room of albedo ½).
 #include "vpl/trace_vpls.h"
 
-#include <numbers>
-
-#include "scene/bsdf.h"
-#include "scene/followed.h"
+#include "scene/scene.h"
 #include "vpl/emitters.h"
 #include "vpl/sphere_radii.h"
 
@@ -15,7 +12,6 @@ namespace lumicut {
 namespace {
 
 constexpr size_t kPathsPerChunk = 1024;
-constexpr float kInvPi = std::numbers::inv_pi_v<float>;
 
 struct LightPath {
   Vec3f origin, direction;
@@ -29,35 +25,6 @@ struct PathVpl {
   uint64_t path;
   Vpl vpl;
 };
-
-// Goes on from a GGX surface, along a followed lobe or by the reflectance that point lights shade: that of a rough
-// clear coat or what is beneath. `wo`: back along the path. False: it ends here.
-bool scatter_ggx(const Scene& scene, const SurfaceHit& surface, const SurfacePoint& point, const Vec3f& wo,
-                 LightPath& path) {
-  const float choice = path.rng.next_float(), u = path.rng.next_float(), v = path.rng.next_float();
-  const float lobe = path.rng.next_float();
-  const auto followed = follow(scene, surface, wo, lobe, u, v);
-  const float qf = followed ? std::min(1.0f, max_component(followed->weight)) : 0.0f;
-  const auto coat = scene.coat_point(surface, wo, 0);
-  const float beneath = max_component(Bsdf(point).albedo()), above = coat ? max_component(Bsdf(*coat).albedo()) : 0.0f;
-  const float qs = std::min(1.0f, beneath + above);
-  const float survive = std::min(1.0f, qf + qs);
-  if (!(choice < survive)) return false;
-  const float p_followed = survive * qf / (qf + qs);
-  if (choice < p_followed) {
-    path.origin = followed->origin, path.direction = followed->direction;
-    path.flux = path.flux * followed->weight * (1.0f / p_followed);
-  } else {
-    const float share = coat ? above / (above + beneath) : 0.0f;
-    const bool chosen = coat && path.rng.next_float() < share;
-    const BsdfSample s = Bsdf(chosen ? *coat : point).sample(lobe, u, v);
-    const bool behind = dot(surface.geometric_normal, wo) < 0.0f;
-    if (!(s.pdf > 0.0f) || (dot(s.direction, surface.geometric_normal) < 0.0f) != behind) return false;
-    path.origin = point.position, path.direction = s.direction;
-    path.flux = path.flux * s.weight * (1.0f / ((survive - p_followed) * (chosen ? share : 1.0f - share)));
-  }
-  return max_component(path.flux) > 0.0f && is_finite(path.flux);
-}
 
 // Follows paths [first, last) in step, so that rays are traced in batches.
 std::vector<PathVpl> trace_paths(const Scene& scene, const Emitters& emitters, const VplOptions& options,
@@ -81,57 +48,17 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const Emitters& emitters, c
     for (size_t i = 0; i < paths.size(); ++i) {
       if (rays[i].hit.geom == kNoId) continue;
       LightPath path = paths[i];
-      const SurfaceHit surface = scene.surface(rays[i]);
-      const Vec3f wo = -path.direction;
-      const bool behind = dot(surface.geometric_normal, wo) < 0.0f;
-      const Vec3f side = behind ? -surface.geometric_normal : surface.geometric_normal;
-      const Vec3f normal = behind ? -surface.normal : surface.normal;
-      if (scene.materials()[surface.material].lobe == LobeModel::ggx) {
-        const SurfacePoint point = scene.shade_point(surface, wo, 0);
-        Vpl v;
-        v.position = surface.position, v.kind = VplKind::oriented, v.normal = normal, v.group = path.group;
-        // Lambertian, of the same flux.
-        v.intensity = path.flux * point.diffuse * mean_of_fading(point.fade);
-        if (max_component(v.intensity) > 0.0f && is_finite(v.intensity)) vpls.push_back({ids[i], v});
-        if (!scatter_ggx(scene, surface, point, wo, path)) continue;
-        paths[alive] = path;
-        ids[alive++] = ids[i];
-        continue;
-      }
-      const Rgb kd = scene.diffuse_color(surface.material, surface.uv);
-      const Rgb ks = scene.specular_color(surface.material, surface.uv);
-      const Vec3f position = surface.position + side * scene.epsilon();
-      if (max_component(kd) > 0.0f) {
-        Vpl v;
-        v.position = surface.position, v.kind = VplKind::oriented, v.normal = normal, v.group = path.group;
-        v.intensity = path.flux * kd * kInvPi;
-        if (max_component(v.intensity) > 0.0f && is_finite(v.intensity)) vpls.push_back({ids[i], v});
-      }
-      // Russian roulette on the lobe's largest reflectance keeps the flux of all paths alike.
-      const float qd = std::min(1.0f, max_component(kd)), qs = std::min(1.0f, max_component(ks));
-      const float survive = std::min(1.0f, qd + qs);
-      const float choice = path.rng.next_float(), u = path.rng.next_float(), v = path.rng.next_float();
-      if (!(choice < survive)) continue;
-      const float p_diffuse = survive * qd / (qd + qs);
-      if (choice < p_diffuse) {
-        const float r = std::sqrt(u), phi = 2.0f * std::numbers::pi_v<float> * v;
-        path.direction =
-            Frame(normal).to_world({r * std::cos(phi), r * std::sin(phi), std::sqrt(std::max(0.0f, 1.0f - u))});
-        path.flux = path.flux * kd * (1.0f / p_diffuse);
-      } else {
-        const Material& material = scene.materials()[surface.material];
-        const float n = material.shininess;
-        const float cosine = std::pow(u, 1.0f / (n + 1.0f)), sine = std::sqrt(std::max(0.0f, 1.0f - cosine * cosine));
-        const float phi = 2.0f * std::numbers::pi_v<float> * v;
-        path.direction =
-            Frame(normalize(reflect(wo, normal))).to_world({sine * std::cos(phi), sine * std::sin(phi), cosine});
-        // lobe·cosθ / pdf, with pdf = (n+1)/2π cosⁿβ
-        const float scale =
-            lobe_scale(material.lobe == LobeModel::phong, n) * 2.0f * std::numbers::pi_v<float> / (n + 1.0f);
-        path.flux = path.flux * ks * (scale * std::max(0.0f, dot(path.direction, normal)) / (survive - p_diffuse));
-      }
-      if (!(dot(path.direction, side) > 0.0f) || !(max_component(path.flux) > 0.0f)) continue;
-      path.origin = position;
+      const SurfaceInteraction at = scene.interaction(rays[i]);
+      Vpl light;
+      light.position = at.position, light.kind = VplKind::oriented, light.normal = at.bsdf.normal();
+      light.group = path.group;
+      light.intensity = at.bsdf.lambertian_intensity(path.flux);
+      if (max_component(light.intensity) > 0.0f && is_finite(light.intensity)) vpls.push_back({ids[i], light});
+      const auto next = at.bsdf.scatter(path.rng);
+      if (!next) continue;
+      path.origin = at.bsdf.origin(next->flags), path.direction = next->direction;
+      path.flux = path.flux * next->weight * next->factor;
+      if (!(max_component(path.flux) > 0.0f) || !is_finite(path.flux)) continue;
       paths[alive] = path;
       ids[alive++] = ids[i];
     }

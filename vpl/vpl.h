@@ -34,7 +34,7 @@ struct Vpl {
 };
 static_assert(sizeof(Vpl) == 64);
 
-// Share of a spot's intensity at cosine `c` to its axis. The vector twin is in clusters/light_kernel-inl.h.
+// Share of a spot's intensity at cosine `c` to its axis. The SIMD counterpart is in clusters/light_kernel-inl.h.
 inline float spot_falloff(const Vpl& v, float c) {
   float x = v.blend_cosine > 0.0f ? (c - v.cos_outer) / v.blend_cosine : (c > v.cos_outer ? 1.0f : 0.0f);
   x = std::min(1.0f, std::max(0.0f, x));

@@ -76,8 +76,8 @@ void add_points(ExperimentScene& s, const View& view, uint32_t side) {
     hit.ray.org = c.origin, hit.ray.dir = c.direction;
     s.scene->accel().intersect({&hit, 1});
     if (hit.hit.geom == kNoId) continue;
-    const SurfaceHit surface = s.scene->surface(hit);
-    s.points.push(s.scene->shade_point(surface, -c.direction, y * side + x));
+    const SurfaceInteraction surface = s.scene->interaction(hit, y * side + x);
+    s.points.push(surface.bsdf.layers()[0]);
     const float pixel = 2.0f * surface.t * c.forward_cosine * camera.tan_half_fov_y / fside;
     s.spread.push_back(std::sqrt(std::max(0.05f, std::abs(dot(surface.geometric_normal, c.direction)))) / pixel);
   }

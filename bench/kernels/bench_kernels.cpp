@@ -153,7 +153,7 @@ ShadePoints make_points(const Scene& scene, uint32_t side) {
       RayHit hit;
       hit.ray.org = s.origin, hit.ray.dir = s.direction;
       scene.accel().intersect({&hit, 1});
-      if (hit.hit.geom != kNoId) points.push(scene.shade_point(scene.surface(hit), -s.direction, tile));
+      if (hit.hit.geom != kNoId) points.push(scene.interaction(hit, tile).bsdf.layers()[0]);
     }
   points.finish();
   return points;

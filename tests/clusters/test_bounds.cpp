@@ -66,10 +66,10 @@ TEST(Bounds, OfGgxAreAboutAsNearAsThoseOfBlinnLobesOfItsWidth) {
           const Vec3f to = normalize(lights[0].position - p.position);
           if (rng.next_below(2) == 0 && dot(to, p.normal) > 0) p.mirror = to;
           if (ggx != 0) {
-            p.specular = {0.5f, 0.5f, 0.5f}, p.grazing = {1, 1, 1}, p.shininess = -alpha;
+            p.specular = {0.5f, 0.5f, 0.5f}, p.grazing = {1, 1, 1}, p.alpha = alpha;
           } else {
-            p.shininess = 0.5f / (alpha * alpha) - 0.5f;
-            p.specular = Rgb{0.5f, 0.5f, 0.5f} * lobe_scale(false, p.shininess);
+            p.exponent = 0.5f / (alpha * alpha) - 0.5f;
+            p.specular = Rgb{0.5f, 0.5f, 0.5f} * cosine_lobe_scale(false, p.exponent);
           }
           points.push(p);
         }

@@ -44,10 +44,10 @@ TEST(PointTree, HoldsEveryPointOnceAndEveryLaneItsPoints) {
           normal_cosine += p.normal[k] * block.normal[k][lane];
         }
         ASSERT_GE(normal_cosine, block.normal_cos[lane] - 1e-5f);
-        ASSERT_GE(p.fade, block.fade[lane]);
+        ASSERT_GE(p.falloff, block.falloff[lane]);
         if (!p.ggx()) continue;
-        ASSERT_LE(block.alpha2_low[lane], p.shininess * p.shininess);
-        ASSERT_GE(block.alpha2_high[lane], p.shininess * p.shininess);
+        ASSERT_LE(block.alpha2_low[lane], p.alpha * p.alpha);
+        ASSERT_GE(block.alpha2_high[lane], p.alpha * p.alpha);
       }
     };
     check(tree.leaves, 16);

@@ -3,9 +3,9 @@
 
 #include <numbers>
 
+#include "bsdf/point_bsdf.h"
 #include "clusters/block_kernel.h"
 #include "clusters/light_kernel.h"
-#include "scene/bsdf.h"
 #include "tests/clusters/random_lighting.h"
 
 namespace lumicut {
@@ -44,7 +44,7 @@ double brute_force(const Vpl& light, const SurfacePoint& p) {
 enum class Model { diffuse, blinn, phong, ggx };
 
 // A point and a sphere that may shine at it, often where its lobe looks.
-void place(Rng& rng, Model model, float shininess, bool inside, SurfacePoint& p, Vpl& light) {
+void place(Rng& rng, Model model, float sharpness, bool inside, SurfacePoint& p, Vpl& light) {
   p = {};
   p.position = test::random_point(rng, 1.0f);
   p.normal = test::random_direction(rng);
@@ -53,9 +53,9 @@ void place(Rng& rng, Model model, float shininess, bool inside, SurfacePoint& p,
   if (model == Model::diffuse) {
     p.diffuse = {0.3f, 0.3f, 0.3f};
   } else if (model == Model::ggx) {
-    p.shininess = -shininess, p.specular = {0.3f, 0.3f, 0.3f}, p.grazing = {1, 1, 1};
+    p.alpha = sharpness, p.specular = {0.3f, 0.3f, 0.3f}, p.grazing = {1, 1, 1};
   } else {
-    p.shininess = shininess, p.specular = Rgb{0.5f, 0.5f, 0.5f} * lobe_scale(model == Model::phong, shininess);
+    p.exponent = sharpness, p.specular = Rgb{0.5f, 0.5f, 0.5f} * cosine_lobe_scale(model == Model::phong, sharpness);
   }
   light.kind = VplKind::sphere;
   light.intensity = {1, 1, 1};
@@ -73,7 +73,7 @@ void place(Rng& rng, Model model, float shininess, bool inside, SurfacePoint& p,
 TEST(SphereIntegral, IsThatOfBruteForceForEveryMaterialInsideAndOutside) {
   struct Case {
     Model model;
-    float shininess;
+    float sharpness;
     double rms, bias;  // largest, over the mean
   };
   // 18 directions: errors of single places are a few percent, and average out.
@@ -88,7 +88,7 @@ TEST(SphereIntegral, IsThatOfBruteForceForEveryMaterialInsideAndOutside) {
         Rng rng(static_cast<uint64_t>(trial), Stage::test, 31 + static_cast<uint64_t>(c.model));
         SurfacePoint p;
         Vpl light;
-        place(rng, c.model, c.shininess, inside, p, light);
+        place(rng, c.model, c.sharpness, inside, p, light);
         // In units of the cone's own size, so that no near sphere outweighs the others.
         const double unit = cone_of(light, p.position).geometry;
         const double truth = brute_force(light, p) / unit;
@@ -96,13 +96,13 @@ TEST(SphereIntegral, IsThatOfBruteForceForEveryMaterialInsideAndOutside) {
         error2 += (value - truth) * (value - truth), difference += value - truth, sum += truth;
       }
       const double rms = std::sqrt(error2 / kTrials) / (sum / kTrials), bias = difference / sum;
-      RecordProperty("model " + std::to_string(static_cast<int>(c.model)) + " " + std::to_string(c.shininess) +
+      RecordProperty("model " + std::to_string(static_cast<int>(c.model)) + " " + std::to_string(c.sharpness) +
                          (inside ? " inside" : " outside"),
                      std::to_string(rms) + " rms, " + std::to_string(bias) + " bias");
-      std::printf("model %d %g %s: rms %.4f bias %+.4f\n", static_cast<int>(c.model), static_cast<double>(c.shininess),
+      std::printf("model %d %g %s: rms %.4f bias %+.4f\n", static_cast<int>(c.model), static_cast<double>(c.sharpness),
                   inside ? "inside" : "outside", rms, bias);
-      EXPECT_LT(rms, c.rms) << static_cast<int>(c.model) << " " << c.shininess << " inside " << inside;
-      EXPECT_LT(std::abs(bias), c.bias) << static_cast<int>(c.model) << " " << c.shininess << " inside " << inside;
+      EXPECT_LT(rms, c.rms) << static_cast<int>(c.model) << " " << c.sharpness << " inside " << inside;
+      EXPECT_LT(std::abs(bias), c.bias) << static_cast<int>(c.model) << " " << c.sharpness << " inside " << inside;
     }
   }
 }
@@ -137,7 +137,7 @@ TEST(SphereIntegral, TendsToThePointLightAsTheSphereShrinks) {
     for (const float share : {2e-3f, 1e-3f, 3e-4f, 1e-4f, 1e-5f, 1e-7f}) {
       sphere.cos_outer = share * d;
       const Rgb got = light_point(sphere, sphere.intensity, 0.0f, p);
-      // Over the cone the sharpest lobe (shininess 1000, α 0.01) varies by some share/0.01 to either side of its mean,
+      // Over the cone the sharpest lobe (exponent 1000, α 0.01) varies by some share/0.01 to either side of its mean,
       // and cosines by `share` near the horizon.
       const float slack = (0.01f + 4.0f * share / 0.01f) * expected.y +
                           2.0f * share / (d * d) * point.intensity.y * (p.diffuse.y + 3000.0f * share);

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "core/error.h"
-#include "scene/followed.h"
 #include "tests/support/test_scenes.h"
 
 namespace lumicut {
@@ -156,7 +155,7 @@ TEST(Scene, ShadingIsTwoSidedAndPointsStandOffTheSurface) {
   const auto room = test::make_room();
   const Vec3f n{0, 0, 1};
   for (float side : {1.0f, -1.0f}) {
-    const SurfacePoint p = room->shade_point({0, 0, 0}, n, n, {}, 0, {0, 0, side}, 0);
+    const SurfacePoint p = room->bsdf({{0, 0, 0}, n, n, {0, 0, side}, room->epsilon()}, 0, {}).layers()[0];
     EXPECT_EQ(p.normal.z, side);
     EXPECT_NEAR(p.position.z, side * room->epsilon(), 1e-12f);
   }
@@ -281,18 +280,18 @@ TEST(Scene, TexturesOfRoughnessAndMetalMultiplyGreenAndBlue) {
   m.roughness = 0.8f, m.metallic = 0.5f, m.roughness_texture = m.metallic_texture = 0;
   const auto scene = square(m, {Texture(2, 1, 3, Texture::Format::float32, {false, true, true}, packed)});
   const SurfaceHit rough = above(*scene, 0.2f, 0.4f), sharp = above(*scene, 0.8f, 0.4f);
-  const GgxColors c = scene->ggx_colors(0, rough.uv);
-  EXPECT_FLOAT_EQ(c.alpha, 0.16f);
-  EXPECT_FLOAT_EQ(c.metal, 0.125f);
-  EXPECT_FLOAT_EQ(c.opaque, 0.875f);
-  // Followed where the texture makes it a mirror, shaded where it does not.
-  EXPECT_FALSE(scene->followed(rough));
-  EXPECT_TRUE(scene->followed(sharp));
-  EXPECT_FALSE(follow(*scene, rough, {0, 0, 1}, 0.5f, 0.5f, 0.5f));
-  ASSERT_TRUE(follow(*scene, sharp, {0, 0, 1}, 0.5f, 0.5f, 0.5f));
-  EXPECT_NEAR(follow(*scene, sharp, {0, 0, 1}, 0.5f, 0.5f, 0.5f)->weight.x, 0.5f * 0.5f + 0.5f * 0.04f, 1e-3f);
-  EXPECT_GT(max_component(scene->shade_point(rough, {0, 0, 1}, 0).specular), 0.0f);
-  EXPECT_EQ(max_component(scene->shade_point(sharp, {0, 0, 1}, 0).specular), 0.0f);
+  const Bsdf of_rough = scene->interaction(rough, {0, 0, 1}).bsdf, of_sharp = scene->interaction(sharp, {0, 0, 1}).bsdf;
+  const BsdfParameters p = scene->bsdf_parameters(0, rough.uv);
+  EXPECT_FLOAT_EQ(p.alpha, 0.16f);
+  EXPECT_FLOAT_EQ(p.metallic, 0.125f);
+  // Specular where the texture makes it a mirror, shaded where it does not.
+  EXPECT_FALSE(of_rough.is_specular());
+  EXPECT_TRUE(of_sharp.is_specular());
+  EXPECT_FALSE(of_rough.sample_specular(0.5f, 0.5f, 0.5f));
+  ASSERT_TRUE(of_sharp.sample_specular(0.5f, 0.5f, 0.5f));
+  EXPECT_NEAR(of_sharp.sample_specular(0.5f, 0.5f, 0.5f)->weight.x, 0.5f * 0.5f + 0.5f * 0.04f, 1e-3f);
+  EXPECT_GT(max_component(of_rough.layers()[0].specular), 0.0f);
+  EXPECT_EQ(max_component(of_sharp.layers()[0].specular), 0.0f);
 }
 
 TEST(Scene, WithoutFresnelALobeReflectsAsMuchAtEveryAngle) {
@@ -303,17 +302,18 @@ TEST(Scene, WithoutFresnelALobeReflectsAsMuchAtEveryAngle) {
     const auto scene = square(m, {});
     const SurfaceHit hit = above(*scene, 0.4f, 0.4f);
     for (const Vec3f view : {Vec3f{0, 0, 1}, normalize(Vec3f{1, 0, 0.05f})}) {
-      const SurfacePoint p = scene->shade_point(hit, view, 0);
+      const Bsdf bsdf = scene->interaction(hit, view).bsdf;
+      const SurfacePoint& p = bsdf.layers()[0];
       EXPECT_NEAR(p.diffuse.x * std::numbers::pi_v<float>, 0.5f, 1e-6f);
-      EXPECT_EQ(p.fade, 0.0f) << "Lambert";
+      EXPECT_EQ(p.falloff, 0.0f) << "Lambert";
       if (roughness > 0.0f) {
         EXPECT_EQ(p.specular, m.specular);
         EXPECT_EQ(p.grazing, m.specular);
       } else {
-        const auto followed = follow(*scene, hit, view, 0.5f, 0.5f, 0.5f);
-        ASSERT_TRUE(followed);
-        EXPECT_NEAR(followed->weight.x, 0.3f, 1e-6f);
-        EXPECT_NEAR(followed->weight.z, 0.1f, 1e-6f);
+        const auto s = bsdf.sample_specular(0.5f, 0.5f, 0.5f);
+        ASSERT_TRUE(s);
+        EXPECT_NEAR(s->weight.x, 0.3f, 1e-6f);
+        EXPECT_NEAR(s->weight.z, 0.1f, 1e-6f);
       }
     }
   }

@@ -1,15 +1,15 @@
 // Vectors of kLanes points in Highway's types, and masks as bits.
 // Compiled once a target: included again by each pass of foreach_target.h.
-#if defined(LUMICUT_CLUSTERS_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef LUMICUT_CLUSTERS_LANES_INL_H_
-#undef LUMICUT_CLUSTERS_LANES_INL_H_
+#if defined(LUMICUT_BSDF_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef LUMICUT_BSDF_LANES_INL_H_
+#undef LUMICUT_BSDF_LANES_INL_H_
 #else
-#define LUMICUT_CLUSTERS_LANES_INL_H_
+#define LUMICUT_BSDF_LANES_INL_H_
 #endif
 
+#include "bsdf/shade_points.h"
 #include "core/vec.h"
 #include "hwy/highway.h"
-#include "scene/shade_points.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
@@ -21,9 +21,6 @@ using V = hn::Vec<D>;
 struct V3 {
   V x, y, z;
 };
-
-// What of the reflectance is evaluated: the diffuse part alone, with Blinn's and Phong's lobes, or with GGX's too.
-enum class Lobes { none, cosine, ggx };
 
 HWY_INLINE V Dot(const V3& a, const V3& b) { return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, hn::Mul(a.x, b.x))); }
 HWY_INLINE V3 Load3(D d, const float (&a)[3][kLanes], size_t i) {

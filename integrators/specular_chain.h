@@ -1,9 +1,9 @@
-// What mirrors and glass show: rays that follow their lobes until surfaces that virtual lights can shade.
+// What mirrors and glass show: rays that follow specular lobes until surfaces that virtual lights can shade.
 #pragma once
 
 #include "core/stats.h"
 #include "integrators/eye_hits.h"
-#include "scene/followed.h"
+#include "scene/scene.h"
 #include "vpl/lamp_surfaces.h"
 
 namespace lumicut {
@@ -15,9 +15,8 @@ struct ChainRay {
   Rng rng;
 };
 
-// The ray that goes on from a surface with such a lobe, if chance keeps it; `throughput`: of what the surface shows.
-std::optional<ChainRay> start_chain(const Scene& scene, const SurfaceHit& hit, const Vec3f& to_viewer,
-                                    const Rgb& throughput, uint32_t pixel, Rng rng);
+// The ray that goes on from a surface with a specular lobe, if chance keeps it; `throughput`: of what the surface shows.
+std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uint32_t pixel, Rng rng);
 
 // Follows the rays to their ends. Lamps with an area are seen in mirrors, though not by the camera itself.
 void follow_chains(const Scene& scene, const LampSurfaces& lamps, std::vector<ChainRay> rays, const Progress& progress,

@@ -14,24 +14,25 @@ inline constexpr size_t round_up_to_lanes(size_t n) { return (n + kLanes - 1) / 
 
 // A surface seen from one side: the shading normal is turned to the viewer.
 struct SurfacePoint {
-  Vec3f position;          // offset from the surface by the scene's epsilon: shadow rays start here
-  Vec3f normal;            // unit, on the viewer's side
-  Vec3f mirror;            // unit: the view direction mirrored about `normal`
-  Rgb diffuse;             // kd/π
-  Rgb specular;            // ks · lobe_scale: radiance factor is specular·cosⁿβ·cosθ
-  float shininess = 0.0f;  // GGX: −α; `specular` is then the reflectance at normal incidence, F0
-  uint32_t pixel = 0;      // points of one pixel lie together
-  Rgb grazing{};           // GGX: reflectance at grazing incidence, F90
-  float fade = 0.0f;       // the diffuse part falls with the light's cosine c as 1 − fade·(1 − c)⁴
+  Vec3f position;         // offset from the surface by the scene's epsilon: shadow rays start here
+  Vec3f normal;           // unit, on the viewer's side
+  Vec3f mirror;           // unit: the view direction mirrored about `normal`
+  Rgb diffuse;            // kd/π
+  Rgb specular;           // cosine lobe: its factor before cosⁿβ (bsdf/cosine_lobe.h); GGX: F0, at normal incidence
+  float exponent = 0.0f;  // n of a cosine lobe
+  uint32_t pixel = 0;     // points of one pixel lie together
+  Rgb grazing{};          // GGX: F90, at grazing incidence
+  float falloff = 0.0f;   // of the diffuse part towards grazing light (bsdf/lambert.h)
+  float alpha = 0.0f;     // GGX: roughness², above 0; 0: a cosine lobe
 
-  bool ggx() const { return shininess < 0.0f; }
+  bool ggx() const { return alpha > 0.0f; }
   // All light that it reflects, times `factor`: what a path has lost on its way here.
   void attenuate(const Rgb& factor) { diffuse *= factor, specular *= factor, grazing *= factor; }
 };
 
 struct ShadePoints {
   // position, normal, mirror, diffuse, specular, grazing: [component][point]
-  std::vector<float> position[3], normal[3], mirror[3], diffuse[3], specular[3], grazing[3], shininess, fade;
+  std::vector<float> position[3], normal[3], mirror[3], diffuse[3], specular[3], grazing[3], exponent, falloff, alpha;
   std::vector<uint32_t> pixel;
 
   size_t size() const { return size_; }

@@ -1,6 +1,4 @@
-#include "integrators/followed_chain.h"
-
-#include "scene/bsdf.h"
+#include "integrators/specular_chain.h"
 
 namespace lumicut {
 
@@ -8,15 +6,14 @@ namespace {
 constexpr uint32_t kMaxSurfaces = 64;  // chance ends chains long before
 }
 
-std::optional<ChainRay> start_chain(const Scene& scene, const SurfaceHit& hit, const Vec3f& to_viewer,
-                                    const Rgb& throughput, uint32_t pixel, Rng rng) {
+std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uint32_t pixel, Rng rng) {
   const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float(), luck = rng.next_float();
-  const auto f = follow(scene, hit, to_viewer, choice, u, v);
-  if (!f) return {};
-  const Rgb weight = throughput * f->weight;
+  const auto s = bsdf.sample_specular(choice, u, v);
+  if (!s) return {};
+  const Rgb weight = throughput * s->weight;
   const float survive = std::min(1.0f, max_component(weight));
   if (!(luck < survive)) return {};
-  return ChainRay{f->origin, f->direction, weight / survive, pixel, rng};
+  return ChainRay{bsdf.origin(s->flags), s->direction, weight / survive, pixel, rng};
 }
 
 void follow_chains(const Scene& scene, const LampSurfaces& lamps, std::vector<ChainRay> chains,
@@ -41,19 +38,14 @@ void follow_chains(const Scene& scene, const LampSurfaces& lamps, std::vector<Ch
         if (max_component(light) > 0.0f) hits.add(light, chain.pixel, scene.environment().group);
         continue;
       }
-      const SurfaceHit surface = scene.surface(rays[i]);
-      const Vec3f to_viewer = -chain.direction;
-      const Rgb light = chain.throughput * scene.emitted(surface, to_viewer);
-      if (max_component(light) > 0.0f) hits.add(light, chain.pixel, scene.meshes()[surface.mesh].group);
-      SurfacePoint point = scene.shade_point(surface, to_viewer, chain.pixel);
-      point.attenuate(chain.throughput);
-      if (!Bsdf(point).black()) hits.found.push_back(point);
-      if (auto coat = scene.coat_point(surface, to_viewer, chain.pixel)) {
-        coat->attenuate(chain.throughput);
-        hits.found.push_back(*coat);
+      const SurfaceInteraction at = scene.interaction(rays[i], chain.pixel);
+      const Rgb light = chain.throughput * at.emitted;
+      if (max_component(light) > 0.0f) hits.add(light, chain.pixel, scene.meshes()[at.mesh].group);
+      for (SurfacePoint point : at.bsdf.layers()) {
+        point.attenuate(chain.throughput);
+        if (!PointBsdf(point).black()) hits.found.push_back(point);
       }
-      if (auto ray = start_chain(scene, surface, to_viewer, chain.throughput, chain.pixel, chain.rng))
-        next.push_back(*ray);
+      if (auto ray = start_chain(at.bsdf, chain.throughput, chain.pixel, chain.rng)) next.push_back(*ray);
     }
     chains = std::move(next);
   }

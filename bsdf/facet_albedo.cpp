@@ -1,8 +1,9 @@
-#include "scene/facet_albedo.h"
+#include "bsdf/facet_albedo.h"
 
 #include <array>
 
-#include "scene/bsdf.h"
+#include "bsdf/ggx_reflection.h"
+#include "bsdf/ggx_transmission.h"
 
 namespace lumicut {
 

@@ -1,4 +1,4 @@
-#include "scene/shade_points.h"
+#include "bsdf/shade_points.h"
 
 namespace lumicut {
 
@@ -8,7 +8,7 @@ template <typename Points, typename Fn>
 void for_each_array(Points& p, Fn fn) {
   for (int k = 0; k < 3; ++k)
     fn(p.position[k]), fn(p.normal[k]), fn(p.mirror[k]), fn(p.diffuse[k]), fn(p.specular[k]), fn(p.grazing[k]);
-  fn(p.shininess), fn(p.fade);
+  fn(p.exponent), fn(p.falloff), fn(p.alpha);
 }
 }  // namespace
 
@@ -34,7 +34,7 @@ void ShadePoints::push(const SurfacePoint& p) {
     specular[k].push_back(p.specular[k]);
     grazing[k].push_back(p.grazing[k]);
   }
-  shininess.push_back(p.shininess), fade.push_back(p.fade);
+  exponent.push_back(p.exponent), falloff.push_back(p.falloff), alpha.push_back(p.alpha);
   pixel.push_back(p.pixel);
   ggx_ = ggx_ || p.ggx();
   glossy_ = glossy_ || p.ggx() || max_component(p.specular) > 0.0f;
@@ -51,7 +51,7 @@ void ShadePoints::finish() {
 SurfacePoint ShadePoints::get(size_t i) const {
   const auto at = [i](const std::vector<float>(&a)[3]) { return Vec3f{a[0][i], a[1][i], a[2][i]}; };
   return {at(position), at(normal), at(mirror),  at(diffuse), at(specular),
-          shininess[i], pixel[i],   at(grazing), fade[i]};
+          exponent[i],  pixel[i],   at(grazing), falloff[i],  alpha[i]};
 }
 
 }  // namespace lumicut

@@ -1,0 +1,91 @@
+// How a surface scatters light, as it is seen from one side: made once a hit, from the material's description there.
+// Two kinds of lobes: those that virtual lights can shade, which lie in layers (SurfacePoint: the surface beneath, and a
+// rough clear coat above it), and specular ones, too sharp for point lights, which rays follow: mirrors and glass.
+// What leaves towards the viewer is the sum of all. docs/decisions/ggx.md
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+
+#include "bsdf/bsdf_parameters.h"
+#include "bsdf/coat.h"
+#include "bsdf/ggx_material.h"
+#include "bsdf/point_bsdf.h"
+#include "core/rng.h"
+
+namespace lumicut {
+
+// Where the surface lies and how it is seen. Unit vectors; `to_viewer` leads away from the surface.
+struct SurfaceView {
+  Vec3f position, geometric_normal, normal, to_viewer;
+  float offset;  // of ray origins from the surface
+  uint32_t pixel = 0;
+};
+
+// The continuation of a light path: its flux is multiplied by weight · factor (which holds the chance of the roulette).
+struct ScatterSample {
+  Vec3f direction;
+  Rgb weight{};
+  float factor = 1.0f;
+  uint32_t flags = 0;
+};
+
+// The continuation of a camera path, by chance: along a specular lobe, or from a layer that lights are sampled at.
+// Neither: it ends.
+struct PathChoice {
+  std::optional<BsdfSample> specular;
+  const SurfacePoint* layer = nullptr;
+  float probability = 1.0f;  // of this choice: to divide by
+};
+
+class Bsdf {
+ public:
+  Bsdf() = default;
+  Bsdf(const BsdfParameters& parameters, const SurfaceView& view);
+
+  // What virtual lights shade, from beneath to above: one point, or two.
+  std::span<const SurfacePoint> layers() const { return {layers_.data(), layer_count_}; }
+  // Whether there is a lobe that rays must follow.
+  bool is_specular() const { return specular_; }
+  // The shading normal on the viewer's side.
+  const Vec3f& normal() const { return normal_; }
+  // Where a ray goes out that such a sample leads along.
+  Vec3f origin(uint32_t flags) const { return position_ + side_ * ((flags & kTransmitted) != 0 ? -offset_ : offset_); }
+
+  // Sum over the layers, without the cosine. 1/sr
+  Rgb evaluate(const Vec3f& to_light) const;
+  // Of the layers, each chosen by what it reflects; specular lobes have none.
+  float pdf(const Vec3f& direction) const;
+  // Base colour and F0 together, at most 1: what an albedo pass shows.
+  Rgb albedo() const { return min(diffuse_color_ + specular_color_, Rgb{1, 1, 1}); }
+  // Intensity of the virtual light that stands for what is reflected evenly of this flux: Lambertian, of the same power.
+  Rgb lambertian_intensity(const Rgb& flux) const;
+
+  // One direction out of the layers, chosen by what they reflect.
+  std::optional<BsdfSample> sample(float layer, float choice, float u, float v) const;
+  // One direction out of the specular lobes: metal, dielectric and coats of α below kLeastAlpha, and glass, which
+  // reflects or refracts by chance of its Fresnel reflectance. `choice`, `u`, `v` in [0, 1). Empty where there is no such
+  // lobe, or where the light is lost in it. The mean weight is at most 1 (of one direction through rough glass it may be
+  // more: what others lose is given back); solid angles that refraction narrows are not in it, since a closed body
+  // widens them again.
+  std::optional<BsdfSample> sample_specular(float choice, float u, float v) const;
+  // One direction out of all lobes with Russian roulette by what they reflect, which keeps the flux of all paths alike.
+  std::optional<ScatterSample> scatter(Rng& rng) const;
+  PathChoice choose(Rng& rng) const;
+
+ private:
+  std::optional<ScatterSample> scatter_cosine(Rng& rng) const;
+  float coat_share() const;
+
+  BsdfParameters parameters_;
+  GgxColors colors_{};
+  std::array<SurfacePoint, 2> layers_;
+  uint32_t layer_count_ = 0;
+  bool specular_ = false, behind_ = false;
+  Vec3f position_, side_, normal_, to_viewer_;  // both normals on the viewer's side; `side_` is the geometric one
+  float offset_ = 0.0f;
+  Rgb diffuse_color_{}, specular_color_{};
+};
+
+}  // namespace lumicut

@@ -1,0 +1,26 @@
+// A material's description at one place, its textures looked up: all that a Bsdf is made from.
+#pragma once
+
+#include <algorithm>
+
+#include "bsdf/facet_albedo.h"
+#include "core/vec.h"
+
+namespace lumicut {
+
+enum class LobeModel { blinn, phong, ggx };
+
+struct BsdfParameters {
+  LobeModel model = LobeModel::blinn;
+  Rgb diffuse{},
+      specular{};         // kd and ks; GGX: base colour, and factor of the dielectric's F0 (or F0 without `fresnel`)
+  float exponent = 0.0f;  // Blinn, Phong
+  // GGX alone.
+  bool fresnel = true;
+  float alpha = 0.25f;  // roughness²
+  float metallic = 0.0f, ior = 1.5f, transmission = 0.0f;
+  float coat = 0.0f, coat_alpha = 0.0f, coat_ior = 1.5f;  // a clear layer over all of this; `coat`: its share
+  const GlassAlbedo* glass = nullptr;                     // of that ior, for rough glass
+};
+
+}  // namespace lumicut

@@ -1,0 +1,86 @@
+// The reflectance of a SurfacePoint, which virtual lights shade: a Lambert part and one glossy lobe. Scalar forms; the
+// SIMD counterpart is bsdf/reflectance-inl.h.
+#pragma once
+
+#include <optional>
+
+#include "bsdf/cosine_lobe.h"
+#include "bsdf/ggx_reflection.h"
+#include "bsdf/lambert.h"
+#include "bsdf/shade_points.h"
+
+namespace lumicut {
+
+// Share of the light that the glossy lobe sends back, roughly.
+inline Rgb specular_albedo(const SurfacePoint& p) {
+  if (!p.ggx()) return p.specular * (2.0f * std::numbers::pi_v<float> / (p.exponent + 1.0f));
+  return p.specular + max(p.grazing - p.specular, Rgb{}) * schlick_share(dot(p.normal, p.mirror));
+}
+
+// BRDF towards `to_light` (unit), without the cosine.
+inline Rgb reflectance(const SurfacePoint& p, const Vec3f& to_light) {
+  Rgb f = p.diffuse;
+  if (p.ggx()) {
+    f *= diffuse_falloff(p.falloff, dot(p.normal, to_light));
+    const GgxTerms t = ggx_terms(p.alpha, p.normal, p.mirror, to_light);
+    f += (p.specular * (1.0f - t.fresnel) + p.grazing * t.fresnel) * (t.distribution * t.visibility);
+    return f;
+  }
+  const float beta = dot(p.mirror, to_light);
+  if (beta > 0.0f) f += p.specular * std::pow(std::min(1.0f, beta), p.exponent);
+  return f;
+}
+
+enum BsdfFlags : uint32_t { kReflected = 1, kTransmitted = 2, kSpecular = 4 };
+
+struct BsdfSample {
+  Vec3f direction;     // unit
+  Rgb weight{};        // BSDF · cosine / density
+  float pdf = 0.0f;    // per steradian; 0 of specular lobes, which nothing but their own samples finds
+  uint32_t flags = 0;  // BsdfFlags
+};
+
+// Mixture of the lobes by how much they reflect, each sampled by its shape. [Lafortune, Willems 1994]
+class PointBsdf {
+ public:
+  explicit PointBsdf(const SurfacePoint& point) : point_(point) {
+    const float diffuse = std::numbers::pi_v<float> * luminance(point.diffuse), sum = luminance(albedo());
+    diffuse_share_ = sum > 0.0f ? diffuse / sum : 1.0f;
+    black_ = !(sum > 0.0f);
+  }
+
+  bool black() const { return black_; }
+  // Share of the light that the lobes send back, as if none fell below the horizon.
+  Rgb albedo() const { return point_.diffuse * std::numbers::pi_v<float> + specular_albedo(point_); }
+
+  float pdf(const Vec3f& direction) const {
+    const float cosine = dot(point_.normal, direction);
+    if (black_ || !(cosine > 0.0f)) return 0.0f;
+    const float p = diffuse_share_ * cosine * std::numbers::inv_pi_v<float>;
+    if (!(diffuse_share_ < 1.0f)) return p;
+    const float share = 1.0f - diffuse_share_;
+    return p + (point_.ggx() ? ggx_reflection_pdf(share, point_.alpha, point_.normal, point_.mirror, direction)
+                             : cosine_lobe_pdf(share, point_.exponent, dot(point_.mirror, direction)));
+  }
+
+  // `choice`, `u`, `v` in [0, 1). Empty where nothing is reflected that way.
+  std::optional<BsdfSample> sample(float choice, float u, float v) const {
+    if (black_) return {};
+    BsdfSample s;
+    s.direction = choice < diffuse_share_ ? sample_cosine_hemisphere(point_.normal, u, v)
+                  : point_.ggx()          ? sample_ggx_reflection(point_.alpha, point_.normal, point_.mirror, u, v)
+                                          : sample_cosine_lobe(point_.mirror, point_.exponent, u, v);
+    s.pdf = pdf(s.direction);
+    if (!(s.pdf > 0.0f)) return {};
+    s.weight = reflectance(point_, s.direction) * (dot(point_.normal, s.direction) / s.pdf);
+    s.flags = kReflected;
+    return s;
+  }
+
+ private:
+  const SurfacePoint& point_;
+  float diffuse_share_ = 1.0f;
+  bool black_ = false;
+};
+
+}  // namespace lumicut

@@ -1,0 +1,25 @@
+// What a ray finds.
+#pragma once
+
+#include "bsdf/bsdf.h"
+
+namespace lumicut {
+
+// Geometry of a hit, in world space.
+struct SurfaceHit {
+  Vec3f position;          // on the surface
+  Vec3f geometric_normal;  // unit, the mesh's front side
+  Vec3f normal;            // unit shading normal, on the geometric normal's side
+  Vec2f uv;
+  uint32_t material = 0, mesh = 0, triangle = 0;
+  float t = 0.0f;
+};
+
+// A hit as it is seen from one side: made once, by Scene::interaction.
+struct SurfaceInteraction : SurfaceHit {
+  Vec3f to_viewer;  // unit, away from the surface
+  Rgb emitted{};    // radiance towards the viewer
+  Bsdf bsdf;
+};
+
+}  // namespace lumicut

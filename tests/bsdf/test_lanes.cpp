@@ -1,0 +1,94 @@
+// The SIMD form of each lobe against its scalar form, on random input.
+#include <gtest/gtest.h>
+
+#include "bsdf/point_bsdf.h"
+#include "core/rng.h"
+#include "tests/support/test_scenes.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "tests/bsdf/test_lanes.cpp"
+#include "hwy/foreach_target.h"  // compiles this file once a target; before highway.h
+
+#include "bsdf/reflectance-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace lumicut::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+void ReflectanceOf(const ShadePoints& points, size_t p, const Vec3f& to_light, float* rgb) {
+  const D d;
+  const V3 normal = Load3(d, points.normal, p), light = Set3(d, to_light);
+  const V3 f = points.ggx()      ? Reflectance<Lobes::ggx>(d, points, p, normal, light)
+               : points.glossy() ? Reflectance<Lobes::cosine>(d, points, p, normal, light)
+                                 : Reflectance<Lobes::none>(d, points, p, normal, light);
+  rgb[0] = hn::GetLane(f.x), rgb[1] = hn::GetLane(f.y), rgb[2] = hn::GetLane(f.z);
+}
+
+void DiffuseFalloffOf(float falloff, float cosine, float* out) {
+  const D d;
+  out[0] = hn::GetLane(DiffuseFalloff(d, hn::Set(d, falloff), hn::Set(d, cosine)));
+  out[1] = hn::GetLane(BoundOfDiffuseFalloff(d, hn::Set(d, falloff), hn::Set(d, cosine)));
+}
+
+}  // namespace lumicut::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace lumicut {
+HWY_EXPORT(ReflectanceOf);
+HWY_EXPORT(DiffuseFalloffOf);
+
+namespace {
+
+SurfacePoint random_point(Rng& rng, int kind) {
+  const auto color = [&] { return Rgb{rng.next_float(), rng.next_float(), rng.next_float()}; };
+  SurfacePoint p;
+  p.normal = test::random_direction(rng);
+  Vec3f view = test::random_direction(rng);
+  if (dot(view, p.normal) < 0.0f) view = -view;
+  p.mirror = reflect(view, p.normal);
+  p.diffuse = color();
+  if (kind == 0) return p;
+  p.specular = color();
+  if (kind == 1) {
+    p.exponent = std::pow(1000.0f, rng.next_float());
+  } else {
+    p.alpha = std::pow(kLeastAlpha, rng.next_float());
+    p.grazing = color(), p.falloff = rng.next_float();
+  }
+  return p;
+}
+
+// Exponents and sharp lobes magnify a last bit: 1e-4 of the lobe's height is some thousand units in the last place.
+TEST(Lanes, EachLobeIsItsScalarForm) {
+  Rng rng(21, Stage::test);
+  for (int kind = 0; kind < 3; ++kind)
+    for (int i = 0; i < 20000; ++i) {
+      const SurfacePoint p = random_point(rng, kind);
+      ShadePoints points;
+      points.push(p);
+      points.finish();
+      Vec3f to_light = test::random_direction(rng);
+      if (i % 2 == 0) to_light = normalize(p.mirror + to_light * 0.05f);  // within the lobe
+      if (dot(to_light, p.normal) < 1e-3f) continue;
+      float rgb[3];
+      HWY_DYNAMIC_DISPATCH(ReflectanceOf)(points, 0, to_light, rgb);
+      const Rgb expected = reflectance(p, to_light);
+      for (int k = 0; k < 3; ++k) ASSERT_NEAR(rgb[k], expected[k], 1e-4f * (1.0f + expected[k])) << kind << " " << i;
+    }
+}
+
+TEST(Lanes, FalloffIsItsScalarFormAndItsOwnBound) {
+  Rng rng(22, Stage::test);
+  for (int i = 0; i < 1000; ++i) {
+    const float falloff = rng.next_float(), cosine = rng.next_float();
+    float out[2];
+    HWY_DYNAMIC_DISPATCH(DiffuseFalloffOf)(falloff, cosine, out);
+    EXPECT_NEAR(out[0], diffuse_falloff(falloff, cosine), 1e-6f);
+    EXPECT_NEAR(out[1], diffuse_falloff(falloff, cosine), 1e-6f) << "it grows with the cosine";
+  }
+}
+
+}  // namespace
+}  // namespace lumicut
+#endif
