@@ -49,7 +49,7 @@ Vpl mean_light(std::span<const Vpl> lights, const std::vector<uint8_t>& group_of
     if (strongest == nullptr || luminance(v.intensity) > luminance(strongest->intensity)) strongest = &v;
   }
   Vpl out = *strongest;
-  if (out.kind == VplKind::sphere) out.cos_outer = static_cast<float>(radius / total);
+  if (out.kind == VplKind::sphere) out.radius = static_cast<float>(radius / total);
   const double length_of_normal = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
   for (int k = 0; k < 3; ++k) {
     out.position[k] = static_cast<float>(position[k] / total);
@@ -177,7 +177,7 @@ void WspdTree::find_balls(Progress& progress) {
         box.extend(place(i));
         power += static_cast<double>(luminance(lights_[i].intensity));
         if (lights_[i].kind == VplKind::sphere)
-          node.largest_sphere = std::max(node.largest_sphere, lights_[i].radius());
+          node.largest_sphere = std::max(node.largest_sphere, lights_[i].radius);
       }
       node.center = node.last - node.first == 1 ? place(node.first) : box.center();
       float radius2 = 0.0f;

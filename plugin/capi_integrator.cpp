@@ -126,7 +126,7 @@ lumicut_result lumicut_integrator_prepare(lumicut_integrator integrator, lumicut
     const Gate::Hold reading = s.gate.read("lumicut_integrator_prepare");
     s.require_committed();
     auto stats = std::make_unique<Stats>();
-    run_work(i.work, [&](Progress& progress) { i.device->arena.run([&] { i.prepare(s, progress, *stats); }); });
+    run_work(i.work, [&](Progress& progress) { i.device->arena.run([&] { i.prepare_for(s, progress, *stats); }); });
     i.stats = std::move(stats);
   });
 }
@@ -152,11 +152,12 @@ lumicut_result lumicut_integrator_shade(lumicut_integrator integrator, const lum
     const Gate::Hold using_integrator = i.gate.read("lumicut_integrator_shade");
     if (i.prepared == nullptr) fail_state("lumicut_integrator: it is not prepared");
     const Prepared& p = *i.prepared;
-    const Gate::Hold using_scene = p.scene->gate.read("lumicut_integrator_shade");
-    if (p.scene->changed || p.scene_version != p.scene->scene.version())
+    lumicut_scene_t& s = i.prepared_scene();
+    const Gate::Hold using_scene = s.gate.read("lumicut_integrator_shade");
+    if (s.changed || p.scene_version != s.scene.version())
       fail_state("lumicut_integrator: its scene was changed since lumicut_integrator_prepare");
     const std::shared_ptr<Progress> progress = i.work.share();
-    const Scene& scene = p.scene->scene;
+    const Scene& scene = s.scene;
     i.device->arena.run([&] {
       check_points(scene, points, count);
       const auto batches = batches_of(points, count, std::max<size_t>(1, p.method->batch_size()));

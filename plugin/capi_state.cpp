@@ -4,10 +4,10 @@
 
 #include "plugin/check.h"
 #include "plugin/convert.h"
-#include "plugin/identity.h"
 #include "plugin/include/lumicut/lumicut_state.h"
 #include "plugin/objects.h"
 #include "plugin/state.h"
+#include "render/identity.h"
 #include "vpl/light_profile.h"
 #include "vpl/trace_vpls.h"
 
@@ -48,11 +48,12 @@ std::string state_key(const lumicut_integrator_t& i, const Params& params, const
 std::vector<uint8_t> save(lumicut_integrator_t& i) {
   if (i.prepared == nullptr) fail_state("lumicut_integrator: nothing is prepared, so nothing can be saved");
   const Prepared& p = *i.prepared;
-  const Gate::Hold reading = p.scene->gate.read("lumicut_state_extension.save");
-  if (p.scene->changed || p.scene_version != p.scene->scene.version())
+  lumicut_scene_t& s = i.prepared_scene();
+  const Gate::Hold reading = s.gate.read("lumicut_state_extension.save");
+  if (s.changed || p.scene_version != s.scene.version())
     fail_state("lumicut_integrator: its scene was changed since it was prepared");
   const std::vector<uint8_t> own = p.method->save_state();
-  const std::string key = state_key(i, *p.params, p.scene->scene);
+  const std::string key = state_key(i, *p.params, s.scene);
   Header h{};
   std::memcpy(h.magic, kMagic, sizeof(kMagic));
   h.version = kVersion, h.byte_order = kByteOrder;
@@ -119,7 +120,8 @@ void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uin
   vpls->light_paths = h.light_paths;
 
   auto next = std::make_unique<Prepared>();
-  next->scene = Ref(s);
+  next->scene = &s.scene;
+  next->scene_owner = owner_of(s);
   next->scene_version = s.scene.version();
   next->params_key = params_text(i.params);
   next->vpls_key = tracing_key(i.params);

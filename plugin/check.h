@@ -7,15 +7,10 @@
 #include <string>
 
 #include "accel/accel.h"
+#include "core/number_text.h"
 #include "core/vec.h"
 
 namespace lumicut {
-
-// Shortest text of a number that reads back the same; '.' whatever the locale.
-std::string number_text(float value);
-std::string number_text(double value);
-std::string number_text(uint64_t value);
-std::string number_text(int64_t value);
 
 // The structure that fields belong to, for texts. Costs nothing until a check fails.
 class Checked {

@@ -405,7 +405,7 @@ VplSet to_vpls(const lumicut_vpl* lights, uint64_t count) {
       vpl.blend_cosine = in.blend, vpl.spot_cosine = in.spot_cosine, vpl.spread_tan = in.spread_tan;
     } else if (vpl.kind == VplKind::sphere) {
       c.range("cos_outer", in.cos_outer, std::numeric_limits<float>::min(), kLargestCoordinate);
-      vpl.cos_outer = in.cos_outer;
+      vpl.radius = in.cos_outer;
     } else if (vpl.kind == VplKind::spot) {
       c.range("cos_outer", in.cos_outer, -1.0f, 1.0f);
       c.range("blend", in.blend, 0.0f, 2.0f);
@@ -489,7 +489,7 @@ FrameOptions to_frame_options(const lumicut_render_desc& in) {
   return o;
 }
 
-PassOptions to_pass_options(const lumicut_render_desc& in) {
+IterationOptions to_pass_options(const lumicut_render_desc& in) {
   const Checked c("lumicut_render_desc");
   c.not_negative("max_seconds", in.max_seconds);
   c.range("target_error", in.target_error, 0.0f, 1e6f);
@@ -498,10 +498,10 @@ PassOptions to_pass_options(const lumicut_render_desc& in) {
   if (in.checkpoint != nullptr && in.checkpoint_size == 0) c.fail("checkpoint_size", "0 bytes are no checkpoint");
   if (in.checkpoint == nullptr && in.checkpoint_size != 0)
     c.fail("checkpoint", "is NULL, but checkpoint_size is " + number_text(in.checkpoint_size));
-  PassOptions o;
+  IterationOptions o;
   o.max_seconds = in.max_seconds, o.target_error = in.target_error;
   o.confidence = in.confidence > 0.0f ? in.confidence : 0.95;
-  o.passes = in.passes > 0 ? in.passes : (in.max_seconds > 0.0f || in.target_error > 0.0f ? 0 : 1);
+  o.count = in.passes > 0 ? in.passes : (in.max_seconds > 0.0f || in.target_error > 0.0f ? 0 : 1);
   o.groups = (in.flags & LUMICUT_GROUPS) != 0;
   o.checkpoints = (in.flags & LUMICUT_CHECKPOINTS) != 0;
   if (in.checkpoint != nullptr) {

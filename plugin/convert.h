@@ -5,9 +5,9 @@
 #include <memory>
 
 #include "film/film.h"
-#include "integrators/frame.h"
 #include "plugin/boundary.h"
-#include "plugin/passes.h"
+#include "render/frame.h"
+#include "render/iterations.h"
 #include "scene/scene.h"
 #include "vpl/light_profile.h"
 #include "vpl/vpl.h"
@@ -41,7 +41,7 @@ void check_points(const Scene& scene, const lumicut_point* points, uint64_t coun
 
 // Size, crop, samples and tiles.
 FrameOptions to_frame_options(const lumicut_render_desc& in);
-PassOptions to_pass_options(const lumicut_render_desc& in);
+IterationOptions to_pass_options(const lumicut_render_desc& in);
 // Fails where that is more than the machine's memory.
 void check_render_bytes(const Rect& crop, uint64_t bytes);
 

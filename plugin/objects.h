@@ -15,6 +15,7 @@
 #include "integrators/integrator.h"
 #include "plugin/boundary.h"
 #include "plugin/convert.h"
+#include "render/preparation.h"
 #include "scene/scene.h"
 
 namespace lumicut {
@@ -62,23 +63,6 @@ std::string stats_json(double seconds, const Stats& stats);
 uint64_t peak_memory();
 uint64_t resident_memory();
 
-// All parameters, "name=value" a line; and those that light tracing depends on.
-std::string params_text(const Params& params);
-std::string tracing_key(const Params& params);
-
-// What an integrator made of a scene. Never changes once it is made: shade reads it from many threads.
-struct Prepared {
-  Ref<lumicut_scene_t> scene;
-  uint64_t scene_version = 0;
-  std::string params_key, vpls_key;    // the parameters it was made with: all, those of light tracing
-  uint64_t host_lights = 0;            // which of the host's sets; 0: traced
-  std::shared_ptr<const VplSet> vpls;  // as traced, or as the host gave them
-  std::vector<ProfileRef> profiles;    // theirs
-  VplSet standing_off;                 // the same, off their surfaces: what the method shades with
-  std::optional<Params> params;
-  std::unique_ptr<Integrator> method;
-};
-
 }  // namespace lumicut
 
 struct lumicut_device_t : lumicut::ObjectOf<lumicut_device_t> {
@@ -119,29 +103,23 @@ struct lumicut_scene_t : lumicut::ObjectOf<lumicut_scene_t> {
   std::string stats_text;
 };
 
-struct lumicut_integrator_t : lumicut::ObjectOf<lumicut_integrator_t> {
+struct lumicut_integrator_t : lumicut::ObjectOf<lumicut_integrator_t>, lumicut::Preparation {
   static constexpr auto kKind = lumicut::HandleKind::integrator;
-  lumicut_integrator_t(lumicut_device_t& d, const lumicut::IntegratorEntry& e)
-      : device(d), entry(e), params(lumicut::all_params(e)) {}
+  lumicut_integrator_t(lumicut_device_t& d, const lumicut::IntegratorEntry& e) : Preparation(e), device(d) {}
 
-  // Lights and trees for the scene as it stands; nothing where that was done already. Runs in the device's arena.
-  // On failure what was prepared before stands.
-  void prepare(lumicut_scene_t& scene, lumicut::Progress& progress, lumicut::Stats& into) {
-    prepare(scene, params, progress, into);
-  }
-  // The same with other parameters than its own: those of one pass.
-  void prepare(lumicut_scene_t& scene, const lumicut::Params& with, lumicut::Progress& progress, lumicut::Stats& into);
+  // Preparation::prepare with its own parameters, in the device's arena.
+  void prepare_for(lumicut_scene_t& scene, lumicut::Progress& progress, lumicut::Stats& into);
+  // The scene that `prepared` is of.
+  lumicut_scene_t& prepared_scene() const;
 
   lumicut::Ref<lumicut_device_t> device;
-  const lumicut::IntegratorEntry& entry;
   lumicut::Gate gate{lumicut::HandleKind::integrator};
   lumicut::Work work;
-  lumicut::Params params;
-  std::shared_ptr<const lumicut::VplSet> host_lights;  // null: traced
-  std::vector<lumicut::ProfileRef> host_profiles;      // theirs
-  uint64_t host_lights_id = 0;                         // rises with each set; 0 where there are none
-  uint64_t host_lights_sets = 0;
-  std::unique_ptr<lumicut::Prepared> prepared;
   std::unique_ptr<lumicut::Stats> stats = std::make_unique<lumicut::Stats>();
   std::string stats_text;
 };
+
+namespace lumicut {
+// Keeps the scene for as long as it is held (Prepared::scene_owner).
+std::shared_ptr<const void> owner_of(lumicut_scene_t& scene);
+}  // namespace lumicut

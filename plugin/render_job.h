@@ -9,17 +9,15 @@
 #include <limits>
 #include <thread>
 
-#include "film/film.h"
-#include "integrators/frame.h"
 #include "plugin/objects.h"
-#include "plugin/passes.h"
+#include "render/render_loop.h"
 
 struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
   static constexpr auto kKind = lumicut::HandleKind::render;
 
   // Takes both objects for the length of the render, and starts it. Throws INVALID_STATE where they are in use.
   lumicut_render_t(lumicut_integrator_t& integrator, lumicut_scene_t& scene, const lumicut::FrameOptions& options,
-                   lumicut::PassOptions passes);
+                   lumicut::IterationOptions passes);
   // Cancels what runs and waits for it.
   ~lumicut_render_t();
 
@@ -32,14 +30,18 @@ struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
   const std::vector<uint8_t>& checkpoint();
   // Tiles that are not done yet read as 0.
   void read(const lumicut::ChannelInfo& channel, const lumicut::Rect& rect, float* out) {
-    read_plane(rect, channel.components, out,
-               [&](uint32_t x, uint32_t y) { return film_.pixel(channel.channel, x, y); });
+    loop_->read([&](const lumicut::Film& film) {
+      read_plane(rect, channel.components, out,
+                 [&](uint32_t x, uint32_t y) { return film.pixel(channel.channel, x, y); });
+    });
   }
   // The same of one light group; `index` into groups().
   void read_group(size_t index, const lumicut::Rect& rect, float* out) {
-    read_plane(rect, 3, out, [&](uint32_t x, uint32_t y) { return film_.group_pixel(index, x, y); });
+    loop_->read([&](const lumicut::Film& film) {
+      read_plane(rect, 3, out, [&](uint32_t x, uint32_t y) { return film.group_pixel(index, x, y); });
+    });
   }
-  const std::vector<uint32_t>& groups() const { return film_.groups(); }
+  const std::vector<uint32_t>& groups() const { return loop_->groups(); }
 
   lumicut::Work work;
   lumicut::Stats stats;
@@ -50,15 +52,6 @@ struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
   void run() noexcept;
   void read_plane(const lumicut::Rect& rect, size_t components, float* out,
                   const std::function<const float*(uint32_t, uint32_t)>& pixel);
-  void render();
-  void render_passes();
-  lumicut::FrameOptions frame_options(const lumicut::Prepared& prepared) const;
-  // What renders: the method as it was prepared, or one for the lights of each group.
-  struct OfGroup {
-    lumicut::VplSet lights;
-    std::unique_ptr<lumicut::Integrator> method;
-  };
-  std::vector<lumicut::GroupMethod> methods(const lumicut::Prepared& prepared, std::vector<OfGroup>& of_groups);
   void tile_done(const lumicut::Rect& tile);
   lumicut::Rect tile_rect(uint32_t column, uint32_t row) const;
 
@@ -66,8 +59,7 @@ struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
   lumicut::Ref<lumicut_scene_t> scene_;
   lumicut::Gate::Hold using_integrator_, using_scene_;
   std::shared_ptr<lumicut::Progress> progress_;
-  lumicut::Film film_;  // of passes: their mean
-  lumicut::PassOptions passes_;
+  std::unique_ptr<lumicut::RenderLoop> loop_;
   const uint32_t columns_, rows_;
   std::vector<std::atomic<uint8_t>> done_;  // a tile: its pixels may be read
 
@@ -75,12 +67,8 @@ struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
   mutable std::condition_variable ended_;
   std::deque<lumicut::Rect> tiles_;
   uint64_t tiles_done_ = 0;
-  uint32_t passes_done_ = 0;
-  double error_of_passes_ = std::numeric_limits<double>::infinity();
-  // The last, and the one that a host looks at, which may be older.
-  std::shared_ptr<const std::vector<uint8_t>> checkpoint_,
-      shown_checkpoint_ = std::make_shared<const std::vector<uint8_t>>();
-  mutable std::mutex film_mutex_;  // of passes: pixels change while hosts read them
+  // The one that a host looks at, which may be older than the last.
+  std::shared_ptr<const std::vector<uint8_t>> shown_checkpoint_ = std::make_shared<const std::vector<uint8_t>>();
   bool over_ = false;
   std::exception_ptr failure_;
   std::thread thread_;  // last: all above stands before it starts

@@ -9,7 +9,7 @@ ROOT = pathlib.Path(os.environ.get("LUMICUT_SOURCE_DIR", pathlib.Path(__file__).
 BUILD = pathlib.Path(os.environ.get("LUMICUT_BINARY_DIR", ROOT / "build/release"))
 
 # From the roof down; a folder may include from itself and from folders further down.
-ORDER = ["tools", "io", "plugin", "integrators", "clusters", "vpl", "film", "scene", "bsdf", "geometry", "accel", "core"]
+ORDER = ["tools", "io", "plugin", "render", "integrators", "clusters", "vpl", "film", "scene", "bsdf", "geometry", "accel", "core"]
 # tools and io are hosts: of the library they know the public header and the metrics alone.
 HOSTS_MAY = {"tools": {"tools", "io", "film", "plugin"}, "io": {"io", "film", "plugin"}}
 READS_FILES = {"geometry/command"}  # a host of geometry/, which may include io/ too

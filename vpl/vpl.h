@@ -12,14 +12,19 @@ namespace lumicut {
 enum class VplKind : uint32_t { omni = 0, oriented = 1, directional = 2, spot = 3, sphere = 4 };
 inline constexpr int kVplKinds = 5;
 
-// Layout of lumicut_vpl in lumicut.h (64 bytes).
+// Layout of lumicut_vpl in lumicut.h (64 bytes). A sphere is an oriented light spread over a ball. [Hašan et al. 2009:
+// virtual spherical lights]
 struct Vpl {
   Vec3f position{};  // directional: unused
   VplKind kind = VplKind::omni;
   Vec3f normal{};  // unit; directional: the way light travels; spot: axis; omni: 0
   uint32_t group = 0;
   Rgb intensity{};  // W/sr along the normal; directional: irradiance W/m²
-  float cos_outer = 0.0f, blend_cosine = 0.0f, spot_cosine = 0.0f;  // spot; cos_outer of a sphere: its radius, above 0
+  union {
+    float cos_outer = 0.0f;  // spot
+    float radius;            // sphere: above 0
+  };
+  float blend_cosine = 0.0f, spot_cosine = 0.0f;  // spot
   float spread_tan = 0.0f;  // spot: narrowed area lamps fall off with max(0, 1 − spread_tan·tanθ)
   // Spot: id of a LightProfile [vpl/light_profile.h] in place of the falloff above; then blend_cosine, spot_cosine and
   // spread_tan are the unit vector where its horizontal angle 0 lies, and intensity is that of its largest value.
@@ -27,9 +32,6 @@ struct Vpl {
   LUMICUT_FIELDS(Vpl, position, kind, normal, group, intensity, cos_outer, blend_cosine, spot_cosine, spread_tan,
                  profile)
 
-  // A sphere is an oriented light spread over a ball [Hašan et al. 2009: virtual spherical lights]; spot alone
-  // otherwise.
-  float radius() const { return cos_outer; }
   Vec3f tangent() const { return {blend_cosine, spot_cosine, spread_tan}; }
 };
 static_assert(sizeof(Vpl) == 64);

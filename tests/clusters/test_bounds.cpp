@@ -108,7 +108,7 @@ TEST(Bounds, OfSpheresAreAboutAsNearAsThoseOfPoints) {
         std::vector<Vpl> lights = test::random_cluster(rng, VplKind::oriented, 6);
         const float radius = 0.02f + 0.2f * rng.next_float();
         for (Vpl& v : lights)
-          if (spheres) v.kind = VplKind::sphere, v.cos_outer = radius * (1.0f + rng.next_float());
+          if (spheres) v.kind = VplKind::sphere, v.radius = radius * (1.0f + rng.next_float());
         const ShadePoints points = test::random_points(rng, kLanes, 1.5f, glossy);
         PointBlock block;
         block.load(points, 0);

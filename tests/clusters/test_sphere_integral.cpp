@@ -17,7 +17,7 @@ struct TrueCone {
   double cosine, geometry;
 };
 TrueCone cone_of(const Vpl& light, const Vec3f& position) {
-  const double d = length(light.position - position), r = light.radius();
+  const double d = length(light.position - position), r = light.radius;
   const double c = d >= r ? std::sqrt(1 - r * r / (d * d)) : -std::sqrt(1 - d * d / (r * r));
   return {c, 2 * (1 - c) / (r * r)};
 }
@@ -61,8 +61,8 @@ void place(Rng& rng, Model model, float sharpness, bool inside, SurfacePoint& p,
   light.intensity = {1, 1, 1};
   light.cos_outer = 0.1f + 0.4f * rng.next_float();
   const float distance =
-      light.radius() * (inside ? rng.next_float() : 1.0f + 9.0f * rng.next_float() * rng.next_float());
-  Vec3f to = normalize(p.mirror + test::random_direction(rng) * (1.5f * light.radius() / distance));
+      light.radius * (inside ? rng.next_float() : 1.0f + 9.0f * rng.next_float() * rng.next_float());
+  Vec3f to = normalize(p.mirror + test::random_direction(rng) * (1.5f * light.radius / distance));
   if (!(dot(to, p.normal) > 0)) to = p.normal;
   light.position = p.position + to * distance;
   light.normal = normalize(test::random_direction(rng) - to);

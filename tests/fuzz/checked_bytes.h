@@ -7,7 +7,7 @@
 #include <cstring>
 #include <vector>
 
-#include "plugin/hash.h"
+#include "render/hash.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace lumicut::fuzz {

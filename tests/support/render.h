@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/parallel.h"
-#include "integrators/frame.h"
+#include "render/frame.h"
 #include "tests/support/test_scenes.h"
 #include "vpl/trace_vpls.h"
 

@@ -1,4 +1,4 @@
-#include "plugin/identity.h"
+#include "render/identity.h"
 
 #include <charconv>
 

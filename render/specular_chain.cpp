@@ -1,4 +1,4 @@
-#include "integrators/specular_chain.h"
+#include "render/specular_chain.h"
 
 namespace lumicut {
 
@@ -17,7 +17,7 @@ std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uin
 }
 
 void follow_chains(const Scene& scene, const LampSurfaces& lamps, std::vector<ChainRay> chains,
-                   const Progress& progress, EyeHits& hits, Counters& counters) {
+                   const Progress& progress, TracedPoints& hits, Counters& counters) {
   std::vector<RayHit> rays;
   for (uint32_t depth = 0; depth < kMaxSurfaces && !chains.empty(); ++depth) {
     rays.assign(chains.size(), {});

@@ -11,9 +11,9 @@ namespace lumicut {
 // Half the width of the interval that holds the mean with `confidence`, in standard errors, from `n` >= 2 samples.
 double student_t(double confidence, uint64_t n);
 
-class PassMean {
+class IterationMean {
  public:
-  explicit PassMean(const Rect& crop, double confidence);
+  explicit IterationMean(const Rect& crop, double confidence);
 
   // What `pass` holds inside `rect` joins the mean; `passes`: with this one. Keeps `mean` up to date: depth and
   // position stay those of the first pass. Rectangles of one pass may be added concurrently.

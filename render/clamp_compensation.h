@@ -6,34 +6,34 @@
 #include <memory>
 
 #include "core/stats.h"
-#include "integrators/near_lamps.h"
-#include "integrators/specular_chain.h"
+#include "render/nearby_lights.h"
+#include "render/specular_chain.h"
 #include "scene/scene.h"
 #include "vpl/lamp_surfaces.h"
 
 namespace lumicut {
 
-class EyeRays {
+class ClampCompensation {
  public:
   // `distance`: that of the clamp, above 0. `spheres`: virtual lights on surfaces are, and lose nothing by it. Scene
   // outlives this. Throws Error(cancelled).
-  EyeRays(const Scene& scene, float distance, bool spheres, uint64_t seed, const Progress& progress);
+  ClampCompensation(const Scene& scene, float distance, bool spheres, uint64_t seed, const Progress& progress);
 
   // One ray from each point (unless it is cut short by chance, or the point is black), one sample of each near lamp,
   // and one of all emissive meshes. `level` counts the surfaces since the camera. Deterministic: numbers belong to the places of points.
-  EyeHits trace(const ShadePoints& points, uint32_t level, const Progress& progress, Counters& counters) const;
+  TracedPoints trace(const ShadePoints& points, uint32_t level, const Progress& progress, Counters& counters) const;
 
  private:
-  void near_lamps(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, EyeHits& hits) const;
+  void nearby_lights(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, TracedPoints& hits) const;
 
-  void near_mesh(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, EyeHits& hits) const;
+  void near_mesh(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, TracedPoints& hits) const;
 
   const Scene& scene_;
   const float distance_;
   const bool spheres_;
   const uint64_t seed_;
   Emitters emitters_;
-  NearLamps lamps_;
+  NearbyLights lamps_;
   LampSurfaces lamp_surfaces_;
 };
 

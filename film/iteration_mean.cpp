@@ -1,4 +1,4 @@
-#include "film/pass_mean.h"
+#include "film/iteration_mean.h"
 
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
@@ -12,10 +12,10 @@ double student_t(double confidence, uint64_t n) {
   return boost::math::quantile(t, 0.5 + 0.5 * confidence);
 }
 
-PassMean::PassMean(const Rect& crop, double confidence)
+IterationMean::IterationMean(const Rect& crop, double confidence)
     : crop_(crop), confidence_(confidence), sums_(size_t{crop.width()} * crop.height()) {}
 
-void PassMean::add(const Film& pass, const Rect& rect, uint64_t passes, Film& mean) {
+void IterationMean::add(const Film& pass, const Rect& rect, uint64_t passes, Film& mean) {
   const auto n = static_cast<double>(passes);
   const auto share = static_cast<float>(1.0 / n);
   for (uint32_t y = rect.y0; y < rect.y1; ++y)
@@ -46,7 +46,7 @@ void PassMean::add(const Film& pass, const Rect& rect, uint64_t passes, Film& me
     }
 }
 
-void PassMean::write_error(uint64_t passes, Film& mean) const {
+void IterationMean::write_error(uint64_t passes, Film& mean) const {
   if (passes < 2) return;
   const auto n = static_cast<double>(passes);
   const double t = student_t(confidence_, passes);
@@ -61,7 +61,7 @@ void PassMean::write_error(uint64_t passes, Film& mean) const {
     }
 }
 
-double PassMean::error(const Film& mean, uint64_t passes) const {
+double IterationMean::error(const Film& mean, uint64_t passes) const {
   if (passes < 2) return std::numeric_limits<double>::infinity();
   double total = 0.0;
   for (const Sums& s : sums_) total += s.mean;
@@ -78,13 +78,13 @@ double PassMean::error(const Film& mean, uint64_t passes) const {
   return shares[at];
 }
 
-void PassMean::save(std::vector<uint8_t>& out) const {
+void IterationMean::save(std::vector<uint8_t>& out) const {
   const size_t start = out.size(), bytes = sums_.size() * sizeof(Sums);
   out.resize(start + bytes);
   std::memcpy(out.data() + start, sums_.data(), bytes);
 }
 
-bool PassMean::load(std::span<const uint8_t> bytes) {
+bool IterationMean::load(std::span<const uint8_t> bytes) {
   if (bytes.size() != sums_.size() * sizeof(Sums)) return false;
   std::memcpy(sums_.data(), bytes.data(), bytes.size());
   return true;

@@ -20,7 +20,7 @@ void trace_in_parts(std::span<T> rays, const Progress& progress, const Fn& trace
   }
 }
 
-struct EyeHits {
+struct TracedPoints {
   std::vector<SurfacePoint> found;
   std::vector<Rgb> light;              // emitted towards the ray
   std::vector<uint32_t> pixel, group;  // of each entry of `light`

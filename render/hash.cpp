@@ -1,4 +1,4 @@
-#include "plugin/hash.h"
+#include "render/hash.h"
 
 #include <cstring>
 

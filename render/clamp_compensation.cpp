@@ -1,4 +1,4 @@
-#include "integrators/eye_rays.h"
+#include "render/clamp_compensation.h"
 
 #include "clusters/light_kernel.h"
 #include "core/sampling.h"
@@ -6,7 +6,8 @@
 
 namespace lumicut {
 
-EyeRays::EyeRays(const Scene& scene, float distance, bool spheres, uint64_t seed, const Progress& progress)
+ClampCompensation::ClampCompensation(const Scene& scene, float distance, bool spheres, uint64_t seed,
+                                     const Progress& progress)
     : scene_(scene),
       distance_(distance),
       spheres_(spheres),
@@ -15,7 +16,8 @@ EyeRays::EyeRays(const Scene& scene, float distance, bool spheres, uint64_t seed
       lamps_(scene, emitters_, distance, progress),
       lamp_surfaces_(scene) {}
 
-void EyeRays::near_lamps(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, EyeHits& hits) const {
+void ClampCompensation::nearby_lights(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows,
+                                      TracedPoints& hits) const {
   lamps_.for_each_share(point, rng, [&](const Vpl& vpl, const Rgb& lost) {
     Ray ray;
     ray.org = point.position, ray.dir = vpl.position - point.position;
@@ -25,7 +27,8 @@ void EyeRays::near_lamps(const SurfacePoint& point, Rng& rng, std::vector<Ray>& 
 }
 
 // By power over all meshes: where few emit, most samples hit a near one; where many do, the rays find them.
-void EyeRays::near_mesh(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, EyeHits& hits) const {
+void ClampCompensation::near_mesh(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows,
+                                  TracedPoints& hits) const {
   const DirectSample s = emitters_.sample_one(rng);
   if (!s.on_mesh) return;
   const Vec3f v = s.vpl.position - point.position;
@@ -42,8 +45,9 @@ void EyeRays::near_mesh(const SurfacePoint& point, Rng& rng, std::vector<Ray>& s
   hits.add(lost * power_heuristic(s.density * d2 / cosine, PointBsdf(point).pdf(to_light)), point.pixel, s.vpl.group);
 }
 
-EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, const Progress& progress, Counters& counters) const {
-  EyeHits hits;
+TracedPoints ClampCompensation::trace(const ShadePoints& points, uint32_t level, const Progress& progress,
+                                      Counters& counters) const {
+  TracedPoints hits;
   std::vector<RayHit> rays;
   std::vector<Rgb> weights;
   std::vector<uint32_t> pixels;
@@ -55,7 +59,7 @@ EyeHits EyeRays::trace(const ShadePoints& points, uint32_t level, const Progress
     if (i % 4096 == 0) progress.check();
     const SurfacePoint point = points.get(i);
     Rng rng = place_rng(scene_, point, hash64(seed_, level), Stage::eye_ray);
-    if (!lamps_.empty()) near_lamps(point, rng, shadows, hits);
+    if (!lamps_.empty()) nearby_lights(point, rng, shadows, hits);
     if (emitters_.has_meshes()) near_mesh(point, rng, shadows, hits);
     const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float();
     const auto s = PointBsdf(point).sample(choice, u, v);

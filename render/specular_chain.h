@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/stats.h"
-#include "integrators/eye_hits.h"
+#include "render/traced_points.h"
 #include "scene/scene.h"
 #include "vpl/lamp_surfaces.h"
 
@@ -20,6 +20,6 @@ std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uin
 
 // Follows the rays to their ends. Lamps with an area are seen in mirrors, though not by the camera itself.
 void follow_chains(const Scene& scene, const LampSurfaces& lamps, std::vector<ChainRay> rays, const Progress& progress,
-                   EyeHits& hits, Counters& counters);
+                   TracedPoints& hits, Counters& counters);
 
 }  // namespace lumicut

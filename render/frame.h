@@ -13,7 +13,7 @@ struct FrameOptions {
   uint32_t width = 0, height = 0, samples = 1, tile_size = 64;
   Rect crop;  // inside width × height
   uint64_t seed = 1;
-  float compensate = 0.0f;  // distance of the clamp whose loss rays bring back; 0: none [integrators/eye_rays.h]
+  float compensate = 0.0f;  // distance of the clamp whose loss rays bring back; 0: none [render/clamp_compensation.h]
   bool spheres = false;     // virtual lights are: the clamp takes light of lamps alone
   // Of a render in passes: samples go on from here in the pixel's sequence, and a single one lies at random too.
   struct CameraSamples {

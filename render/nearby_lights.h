@@ -11,10 +11,10 @@
 
 namespace lumicut {
 
-class NearLamps {
+class NearbyLights {
  public:
   // `distance`: that of the clamp, above 0. Throws Error(cancelled).
-  NearLamps(const Scene& scene, const Emitters& emitters, float distance, const Progress& progress);
+  NearbyLights(const Scene& scene, const Emitters& emitters, float distance, const Progress& progress);
   bool empty() const { return lamps_.empty(); }
 
   // What one sample of each near lamp gives the point beyond its clamped light, before visibility: fn(vpl, radiance).

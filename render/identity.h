@@ -4,9 +4,9 @@
 #include <optional>
 #include <string>
 
+#include "core/number_text.h"
 #include "integrators/integrator.h"
-#include "plugin/check.h"
-#include "plugin/hash.h"
+#include "render/hash.h"
 #include "scene/scene.h"
 #include "vpl/vpl.h"
 

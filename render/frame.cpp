@@ -1,4 +1,4 @@
-#include "integrators/frame.h"
+#include "render/frame.h"
 
 #include <numbers>
 #include <optional>
@@ -6,7 +6,7 @@
 
 #include "core/parallel.h"
 #include "core/rng.h"
-#include "integrators/eye_rays.h"
+#include "render/clamp_compensation.h"
 
 namespace lumicut {
 
@@ -113,12 +113,12 @@ class Batch {
   }
 
   // The points of the camera, and those that rays from them find.
-  void shade(const EyeRays* eye_rays, ShadeContext context) {
+  void shade(const ClampCompensation* compensation, ShadeContext context) {
     light_.assign(methods_.size(), std::vector<Rgb>(pixels_.size()));
     counts_.assign(pixels_.size(), {});
-    shade_levels(points_, eye_rays, light_, context);
+    shade_levels(points_, compensation, light_, context);
     for (size_t i = 0; i < seen_.light.size(); ++i) light_[slot(seen_.group[i])][seen_.pixel[i]] += seen_.light[i];
-    if (!seen_.found.empty()) shade_levels(seen_.points(), eye_rays, light_, context);
+    if (!seen_.found.empty()) shade_levels(seen_.points(), compensation, light_, context);
     if (!options_.illuminance) return;
     // White Lambert surfaces show the irradiance over π.
     ShadePoints white;
@@ -132,7 +132,7 @@ class Batch {
     }
     white.finish();
     std::vector<std::vector<Rgb>> shown(methods_.size(), std::vector<Rgb>(pixels_.size()));
-    shade_levels(white, eye_rays, shown, context);
+    shade_levels(white, compensation, shown, context);
     illuminance_.assign(pixels_.size(), 0.0f);
     for (const auto& of_group : shown)
       for (size_t p = 0; p < pixels_.size(); ++p)
@@ -173,16 +173,16 @@ class Batch {
   // Chance ends chains long before.
   static constexpr uint32_t kMaxLevels = 64;
 
-  void shade_levels(const ShadePoints& first, const EyeRays* eye_rays, std::vector<std::vector<Rgb>>& light,
-                    ShadeContext context) {
+  void shade_levels(const ShadePoints& first, const ClampCompensation* compensation,
+                    std::vector<std::vector<Rgb>>& light, ShadeContext context) {
     add_light(first, light, context);
-    if (eye_rays == nullptr) return;
+    if (compensation == nullptr) return;
     const ShadePoints* points = &first;
     ShadePoints found;
     for (uint32_t level = 1; level <= kMaxLevels && points->size() > 0; ++level) {
       context.progress.check();
       Counters counters;
-      const EyeHits hits = eye_rays->trace(*points, level, context.progress, counters);
+      const TracedPoints hits = compensation->trace(*points, level, context.progress, counters);
       context.stats.add(counters);
       for (size_t i = 0; i < hits.light.size(); ++i) light[slot(hits.group[i])][hits.pixel[i]] += hits.light[i];
       found = hits.points();
@@ -276,7 +276,7 @@ class Batch {
   std::vector<PixelSums> sums_;
   ShadePoints points_;
   std::vector<bool> coat_;               // of each point, where the scene has any: whether it is a coat's lobe
-  EyeHits seen_;                         // by way of mirrors and glass
+  TracedPoints seen_;                    // by way of mirrors and glass
   std::vector<std::vector<Rgb>> light_;  // of each method: reflected, summed over a pixel's samples
   std::vector<float> illuminance_;       // summed over a pixel's samples
   std::vector<Vec3f> counts_;            // clusters, rays, bounds
@@ -331,9 +331,9 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
   }
   std::optional<LampSurfaces> lamps;
   if (scene.may_be_specular()) lamps.emplace(scene);
-  std::optional<EyeRays> eye_rays;
+  std::optional<ClampCompensation> compensation;
   if (options.compensate > 0.0f)
-    eye_rays.emplace(scene, options.compensate, options.spheres, options.seed, context.progress);
+    compensation.emplace(scene, options.compensate, options.spheres, options.seed, context.progress);
   context.progress.begin("render", size_t{options.crop.width()} * options.crop.height());
   tbb::parallel_for(
       tbb::blocked_range<size_t>(0, batches.size(), 1),
@@ -343,7 +343,7 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
           Batch batch(scene, methods, options, lamps ? &*lamps : nullptr);
           for (size_t t = batches[b].first; t < batches[b].second; ++t) batch.add_tile(tiles[t]);
           batch.collect(context);
-          batch.shade(eye_rays ? &*eye_rays : nullptr, context);
+          batch.shade(compensation ? &*compensation : nullptr, context);
           context.progress.check();
           batch.write(film);
           context.progress.advance(batch.pixel_count());

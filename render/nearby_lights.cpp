@@ -1,9 +1,9 @@
-#include "integrators/near_lamps.h"
+#include "render/nearby_lights.h"
 
 #include "bsdf/point_bsdf.h"
-#include "core/sampling.h"
 #include "clusters/light_kernel.h"
 #include "core/rng.h"
+#include "core/sampling.h"
 #include "vpl/lamp_surfaces.h"
 
 namespace lumicut {
@@ -28,7 +28,7 @@ Aabb bounds_of(const Light& l) {
 
 }  // namespace
 
-NearLamps::NearLamps(const Scene& scene, const Emitters& emitters, float distance, const Progress& progress)
+NearbyLights::NearbyLights(const Scene& scene, const Emitters& emitters, float distance, const Progress& progress)
     : scene_(scene), emitters_(emitters), distance_(distance) {
   for (uint32_t i = 0; i < scene.lights().size(); ++i) {
     if (i % 64 == 0) progress.check();  // thousands of cells each
@@ -50,18 +50,18 @@ NearLamps::NearLamps(const Scene& scene, const Emitters& emitters, float distanc
   }
 }
 
-NearLamps::Cell NearLamps::cell(const Vec3f& p) const {
+NearbyLights::Cell NearbyLights::cell(const Vec3f& p) const {
   const Vec3f at = (p - (scene_.bounds().empty() ? Vec3f{} : scene_.bounds().lo)) / distance_;
   const auto floor = [](float v) { return static_cast<int64_t>(std::floor(std::clamp(v, -1e9f, 1e9f))); };
   return {floor(at.x), floor(at.y), floor(at.z)};
 }
 
 // Cells that share a key only cost time: every lamp is measured again at the point.
-uint64_t NearLamps::key(const Cell& c) {
+uint64_t NearbyLights::key(const Cell& c) {
   return hash64(hash64(static_cast<uint64_t>(c.x), static_cast<uint64_t>(c.y)), static_cast<uint64_t>(c.z));
 }
 
-Rgb NearLamps::lost_light(uint32_t lamp, const Vpl& vpl, const SurfacePoint& point) const {
+Rgb NearbyLights::lost_light(uint32_t lamp, const Vpl& vpl, const SurfacePoint& point) const {
   const float d2 = length2(vpl.position - point.position), c2 = distance_ * distance_;
   if (!(d2 < c2)) return {};
   Rgb lost = light_point(vpl, vpl.intensity, 0.0f, point) * (1.0f - d2 / c2);

@@ -3,8 +3,8 @@
 
 #include <set>
 
-#include "integrators/frame.h"
-#include "plugin/identity.h"
+#include "render/frame.h"
+#include "render/identity.h"
 #include "vpl/light_profile.h"
 
 namespace {

@@ -1,0 +1,49 @@
+#include "render/iterations.h"
+
+#include <cmath>
+
+#include "core/number_text.h"
+#include "core/rng.h"
+#include "film/iteration_mean.h"
+
+namespace lumicut {
+
+uint64_t film_pixel_bytes(size_t groups) {
+  uint64_t components = 3 * groups;
+  for (const ChannelInfo& c : channel_table()) components += c.components;
+  return components * sizeof(float);
+}
+
+Params params_of_iteration(const Params& params, uint32_t iteration, const Scene& scene) {
+  Params of = params;
+  if (iteration == 0) return of;
+  const auto seed = static_cast<uint64_t>(params.integer("seed"));
+  of.set("seed", number_text(uint64_t{hash64(seed, iteration) & 0xffffffffu}));
+  const double shrink = std::pow(iteration + 1.0, -0.25);
+  if (const double scale = sphere_scale(params) * shrink; scale > 0.0)
+    of.set("sphere_scale", number_text(std::max(scale, 0.001)));
+  if (!params.boolean("compensate")) {
+    const double clamp = clamp_distance(params, scene) * shrink;
+    if (clamp > 0.0) of.set("clamp_distance", number_text(clamp));
+  }
+  return of;
+}
+
+bool enough_iterations(const IterationOptions& options, uint32_t done, double seconds, double last_seconds,
+                       double error) {
+  if (options.count > 0 && done >= options.count) return true;
+  if (options.max_seconds > 0.0 && seconds + 0.5 * last_seconds > options.max_seconds) return true;
+  return options.target_error > 0.0 && done >= kLeastIterationsForError && error <= options.target_error;
+}
+
+uint64_t render_bytes(const Rect& crop, const IterationOptions& options, size_t groups) {
+  const uint64_t film = film_pixel_bytes(groups), state = film + IterationMean::kBytes;
+  uint64_t bytes = film;
+  // The iteration beside the mean; a list in which the image's error is looked up.
+  if (options.progressive()) bytes += film + IterationMean::kBytes + sizeof(double);
+  // One is made, one is the last, one is what a host looks at. Or the one that the render goes on from.
+  bytes += state * (options.checkpoints ? 3 : options.resume.empty() ? 0 : 1);
+  return bytes * crop.width() * crop.height();
+}
+
+}  // namespace lumicut

@@ -1,0 +1,50 @@
+// An integrator with its parameters, and what it made of a scene: lights and trees, kept until something changes that
+// they depend on.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "integrators/integrator.h"
+#include "vpl/light_profile.h"
+
+namespace lumicut {
+
+// All parameters, "name=value" a line; and those that light tracing depends on.
+std::string params_text(const Params& params);
+std::string tracing_key(const Params& params);
+
+// Never changes once it is made: shade reads it from many threads.
+struct Prepared {
+  const Scene* scene = nullptr;
+  std::shared_ptr<const void> scene_owner;  // keeps the scene, where a host may release it
+  uint64_t scene_version = 0;
+  std::string params_key, vpls_key;    // the parameters it was made with: all, those of light tracing
+  uint64_t host_lights = 0;            // which of the host's sets; 0: traced
+  std::shared_ptr<const VplSet> vpls;  // as traced, or as the host gave them
+  std::vector<ProfileRef> profiles;    // theirs
+  VplSet standing_off;                 // the same, off their surfaces: what the method shades with
+  std::optional<Params> params;
+  std::unique_ptr<Integrator> method;
+};
+
+struct Preparation {
+  explicit Preparation(const IntegratorEntry& e) : entry(e), params(all_params(e)) {}
+
+  // Lights and trees for the scene as it stands; nothing where that was done already. On failure what was prepared
+  // before stands. `with`: other parameters than its own, those of one iteration. Throws Error.
+  void prepare(const Scene& scene, std::shared_ptr<const void> scene_owner, const Params& with, Progress& progress,
+               Stats& into);
+
+  const IntegratorEntry& entry;
+  Params params;
+  std::shared_ptr<const VplSet> host_lights;  // null: traced
+  std::vector<ProfileRef> host_profiles;      // theirs
+  uint64_t host_lights_id = 0;                // rises with each set; 0 where there are none
+  uint64_t host_lights_sets = 0;
+  std::unique_ptr<Prepared> prepared;
+};
+
+}  // namespace lumicut

@@ -1,0 +1,139 @@
+#include "render/render_loop.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "render/checkpoint.h"
+
+namespace lumicut {
+
+RenderLoop::RenderLoop(Preparation& preparation, const Scene& scene, std::shared_ptr<const void> scene_owner,
+                       const FrameOptions& options, IterationOptions iterations, std::vector<uint32_t> groups)
+    : preparation_(preparation),
+      scene_(scene),
+      scene_owner_(std::move(scene_owner)),
+      options_(options),
+      iterations_(std::move(iterations)),
+      progressive_(iterations_.progressive()),
+      film_(options.crop, std::move(groups)) {}
+
+RenderLoop::State RenderLoop::state() const {
+  const std::lock_guard lock(state_mutex_);
+  return state_;
+}
+
+FrameOptions RenderLoop::frame_options(const Prepared& prepared) const {
+  FrameOptions frame = options_;
+  frame.seed = static_cast<uint64_t>(prepared.params->integer("seed"));
+  if (prepared.params->boolean("compensate") && preparation_.entry.light_source == LightSource::virtual_lights)
+    frame.compensate = clamp_distance(*prepared.params, scene_);
+  frame.spheres = sphere_scale(*prepared.params) > 0.0f;
+  return frame;
+}
+
+std::vector<GroupMethod> RenderLoop::methods(const Prepared& prepared, std::vector<OfGroup>& of_groups,
+                                             Progress& progress, Stats& stats) const {
+  const std::vector<uint32_t>& groups = film_.groups();
+  if (groups.empty()) return {{0, prepared.method.get()}};
+  of_groups.clear();
+  of_groups.resize(groups.size());
+  for (const Vpl& v : prepared.standing_off.lights) {
+    const auto at = std::lower_bound(groups.begin(), groups.end(), v.group);
+    if (at != groups.end() && *at == v.group)
+      of_groups[static_cast<size_t>(at - groups.begin())].lights.lights.push_back(v);
+  }
+  std::vector<GroupMethod> all;
+  for (size_t g = 0; g < of_groups.size(); ++g) {
+    progress.check();
+    if (!of_groups[g].lights.lights.empty()) {
+      of_groups[g].method = preparation_.entry.create();
+      of_groups[g].method->prepare(scene_, of_groups[g].lights, *prepared.params, {progress, stats});
+    }
+    all.push_back({groups[g], of_groups[g].method.get()});
+  }
+  return all;
+}
+
+void RenderLoop::run(Progress& progress, Stats& stats, const std::function<void(const Rect&)>& tile_done) {
+  progress.check();
+  if (progressive_) return render_iterations(progress, stats, tile_done);
+  preparation_.prepare(scene_, scene_owner_, preparation_.params, progress, stats);
+  const Prepared& prepared = *preparation_.prepared;
+  {
+    const PhaseTimer timer(stats, "render");
+    std::vector<OfGroup> of_groups;
+    render_frame(scene_, methods(prepared, of_groups, progress, stats), frame_options(prepared), film_,
+                 {progress, stats}, tile_done);
+  }
+  progress.check();
+  const std::lock_guard lock(state_mutex_);
+  state_.iterations = 1;
+}
+
+void RenderLoop::render_iterations(Progress& progress, Stats& stats,
+                                   const std::function<void(const Rect&)>& tile_done) {
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point begin = Clock::now();
+  const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
+  IterationMean mean(options_.crop, iterations_.confidence);
+  const std::string key = checkpoint_key(scene_, preparation_.entry.id, preparation_.params,
+                                         preparation_.host_lights.get(), options_, iterations_);
+  uint32_t done = 0;
+  double error = std::numeric_limits<double>::infinity(), last_seconds = 0.0;
+  const auto finish_iteration = [&] {
+    {
+      const std::lock_guard lock(film_mutex_);
+      mean.write_error(done, film_);
+    }
+    error = mean.error(film_, done);
+    stats.set_value("passes", done);
+    if (done >= 2) stats.set_value("error", error);
+    std::shared_ptr<const std::vector<uint8_t>> bytes;
+    if (iterations_.checkpoints)
+      bytes = std::make_shared<const std::vector<uint8_t>>(save_checkpoint(key, done, mean, film_));
+    const std::lock_guard lock(state_mutex_);
+    state_ = {done, error, std::move(bytes)};
+  };
+  const auto prepare = [&](uint32_t iteration) {
+    preparation_.prepare(scene_, scene_owner_, params_of_iteration(preparation_.params, iteration, scene_), progress,
+                         stats);
+  };
+  if (!iterations_.resume.empty()) {
+    done = load_checkpoint(iterations_.resume, key, mean, film_);
+    iterations_.resume = std::vector<uint8_t>();  // frees it, which "= {}" does not
+    finish_iteration();
+    for (const Rect& tile : frame_tiles(options_)) tile_done(tile);
+  }
+  const auto enough = [&] { return done > 0 && enough_iterations(iterations_, done, seconds(), last_seconds, error); };
+  if (enough()) {
+    // All was in the checkpoint. The integrator has the lights of the last iteration, as after any render.
+    prepare(done - 1);
+    return;
+  }
+  Film frame_film(options_.crop, film_.groups());
+  std::vector<OfGroup> of_groups;
+  do {
+    const double start = seconds();
+    prepare(done);
+    const Prepared& prepared = *preparation_.prepared;
+    FrameOptions frame = frame_options(prepared);
+    frame.camera_samples = {static_cast<uint64_t>(preparation_.params.integer("seed")), uint64_t{done} * frame.samples};
+    {
+      const PhaseTimer timer(stats, "render");
+      render_frame(scene_, methods(prepared, of_groups, progress, stats), frame, frame_film, {progress, stats},
+                   [&](const Rect& tile) {
+                     {
+                       const std::lock_guard lock(film_mutex_);
+                       mean.add(frame_film, tile, uint64_t{done} + 1, film_);
+                     }
+                     tile_done(tile);
+                   });
+    }
+    progress.check();
+    ++done;
+    last_seconds = seconds() - start;
+    finish_iteration();
+  } while (!enough());
+}
+
+}  // namespace lumicut
