@@ -1,4 +1,4 @@
-"""The architecture: includes go down the map of docs/design.md, the library links what it says, and one version holds."""
+"""The architecture: includes go down the map of docs/design.md, the library links what it says, decisions are numbered."""
 import os
 import pathlib
 import re
@@ -106,6 +106,18 @@ class Library(unittest.TestCase):
         # Sanitizer runtimes appear in sanitizer builds alone.
         allowed = re.compile(r"^(libembree[34]|libtbb|libhwy|libstdc\+\+|libm|libgcc_s|libc|ld-linux-x86-64|libasan|libubsan|libtsan)\.so")
         self.assertEqual([name for name in needed if not allowed.match(name)], [])
+
+
+class Decisions(unittest.TestCase):
+    def test_each_is_numbered_dated_and_in_the_index_in_order(self):
+        folder = ROOT / "docs/decisions"
+        rows = []
+        for number, page in enumerate(sorted(p for p in folder.glob("*.md") if p.name != "README.md"), 1):
+            self.assertRegex(page.name, rf"^{number:04d}-[a-z0-9-]+\.md$")
+            match = re.match(r"# (.+)\n\nDecided on (\d{4}-\d\d-\d\d)\.\n", page.read_text())
+            self.assertTrue(match, page.name)
+            rows.append(f"| [{number:04d}]({page.name}) | {match[1]} | {match[2]} |")
+        self.assertEqual(re.findall(r"^\| \[.*$", (folder / "README.md").read_text(), re.MULTILINE), rows)
 
 
 if __name__ == "__main__":
