@@ -1,4 +1,4 @@
-"""The architecture: includes go down the map of docs/design.md, the library links what it says, decisions are numbered."""
+"""The architecture: includes go down the map of docs/design.md, the library links what it says, one version holds."""
 import os
 import pathlib
 import re
@@ -106,6 +106,46 @@ class Library(unittest.TestCase):
         # Sanitizer runtimes appear in sanitizer builds alone.
         allowed = re.compile(r"^(libembree[34]|libtbb|libhwy|libstdc\+\+|libm|libgcc_s|libc|ld-linux-x86-64|libasan|libubsan|libtsan)\.so")
         self.assertEqual([name for name in needed if not allowed.match(name)], [])
+
+
+class Version(unittest.TestCase):
+    def setUp(self):
+        self.version = re.search(r"^project\(lumicut VERSION (\d+\.\d+\.\d+) ", (ROOT / "CMakeLists.txt").read_text(),
+                                 re.MULTILINE)[1]
+
+    def test_every_file_that_states_it_states_the_projects(self):
+        addon = ROOT / "export_scripts/lumicut_blender"
+        places = [(addon / "__init__.py", r'"version": \((\d+, \d+, \d+)\)', ", "),
+                  (addon / "blender_manifest.toml", r'^version = "(.*)"$', "."),
+                  (ROOT / "plugin/include/lumicut/lumicut.h", r'lumicut_version\(.*/\* \[any\] "([\d.]+)"', "."),
+                  *((page, r"lumicut_blender-([\d.]+)\.zip", ".") for page in (ROOT / "README.md", ROOT / "docs/blender.md"))]
+        for path, pattern, separator in places:
+            with self.subTest(path=path):
+                found = re.findall(pattern, path.read_text(), re.MULTILINE)
+                self.assertEqual(set(found), {self.version.replace(".", separator)})
+
+    def test_it_is_the_newest_release_of_the_changelog(self):
+        headings = re.findall(r"^## \[(.+?)\](.*)$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+        self.assertEqual(headings[0], ("Unreleased", ""))
+        self.assertEqual(headings[1][0], self.version)
+        for name, date in headings[1:]:
+            self.assertRegex(f"{name}{date}", r"^\d+\.\d+\.\d+ - \d{4}-\d\d-\d\d$")
+
+    def test_no_other_source_states_it(self):
+        written = re.compile(rf'(?<![\d.]){re.escape(self.version)}(?![\d.]*\d)')
+        states = {"CMakeLists.txt", "plugin/include/lumicut/lumicut.h"}
+        found = []
+        for path in sorted(p for p in ROOT.rglob("*") if p.suffix in {*SOURCES, ".py", ".txt", ".cmake", ".in", ".sh"}):
+            name = path.relative_to(ROOT).as_posix()
+            if path.is_file() and name.partition("/")[0] not in NOT_SOURCES and name not in states:
+                found += [f"{name}: {line.strip()}" for line in path.read_text().splitlines() if written.search(line)]
+        self.assertEqual(found, [])
+
+    def test_the_add_on_knows_the_abi_of_the_header(self):
+        header = (ROOT / "plugin/include/lumicut/lumicut.h").read_text()
+        abi = [int(re.search(rf"^#define LUMICUT_ABI_{part} (\d+)$", header, re.MULTILINE)[1]) for part in ("MAJOR", "MINOR")]
+        python = (ROOT / "export_scripts/lumicut_blender/library.py").read_text()
+        self.assertEqual(re.search(r"^ABI_MAJOR, ABI_MINOR = (\d+), (\d+)$", python, re.MULTILINE).groups(), tuple(map(str, abi)))
 
 
 class Decisions(unittest.TestCase):
