@@ -1,7 +1,7 @@
 // How a surface scatters light, as it is seen from one side: made once a hit, from the material's description there.
 // Two kinds of lobes: those that virtual lights can shade, which lie in layers (SurfacePoint: the surface beneath, and a
 // rough clear coat above it), and specular ones, too sharp for point lights, which rays follow: mirrors and glass.
-// What leaves towards the viewer is the sum of all. docs/decisions/ggx.md
+// What leaves towards the viewer is the sum of all. docs/decisions/0014-ggx.md
 #pragma once
 
 #include <array>

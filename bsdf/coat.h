@@ -1,4 +1,4 @@
-// A clear coat: a GGX lobe above a surface, and what it lets through to that. docs/decisions/ggx.md
+// A clear coat: a GGX lobe above a surface, and what it lets through to that. docs/decisions/0014-ggx.md
 #pragma once
 
 #include "bsdf/bsdf_parameters.h"

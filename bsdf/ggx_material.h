@@ -1,5 +1,5 @@
 // A GGX material's shares of metal, glass and coated diffuse, and the diffuse part that they leave.
-// docs/decisions/ggx.md
+// docs/decisions/0014-ggx.md
 #pragma once
 
 #include "bsdf/bsdf_parameters.h"

@@ -1,5 +1,5 @@
 // What a GGX lobe leaves of the light to what lies beneath it: a diffuse base, a coated surface.
-// Fitted to the lobe's directional albedo by numerical integration. docs/decisions/ggx.md
+// Fitted to the lobe's directional albedo by numerical integration. docs/decisions/0014-ggx.md
 #pragma once
 
 #include "bsdf/lambert.h"

@@ -12,7 +12,7 @@ namespace lumicut {
 // Departs from the thesis' compressed octree over normals, then positions: points are split in two along the widest of
 // the six axes of position and normal, so that normals are split first where they differ most and not where they do
 // not; and every split falls on a multiple of the points of a child, so that leaves, groups and regions are full (the
-// last of each aside) and the tree needs no pointers. docs/decisions/illumination-cut.md
+// last of each aside) and the tree needs no pointers. docs/decisions/0006-illumination-cut.md
 struct PointTree {
   static constexpr size_t kLeaf = kLanes, kGroup = kLanes * kLeaf, kRegion = kLanes * kGroup;
 

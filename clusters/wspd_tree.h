@@ -2,7 +2,7 @@
 // need, before any point is known. [Bus, Mustafa and Biri 2015; thesis ch. 2, Def. 2.1-2.3, Alg. 1 and 3, Eq. 2.21]
 // Departs: a subgroup is lit from its mean, not from its centre light; at most kMaxGroups subgroups a cluster; lights
 // that share a finest cell of the octree share a leaf. Distant lights have no distance: they have an octree of
-// directions and one clustering for all points. docs/decisions/wspd-blocks.md
+// directions and one clustering for all points. docs/decisions/0007-wspd-blocks.md
 #pragma once
 
 #include <array>

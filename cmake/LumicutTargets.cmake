@@ -1,4 +1,4 @@
-# How every target of the house is made: one compiler setting, one layout of outputs.
+# Settings that all targets share: compiler options, where outputs go, and functions that add libraries and tests.
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)

@@ -48,7 +48,7 @@ std::vector<uint32_t> greedy_hitting_set(std::span<const Point2> points, std::sp
 // Ch. 8: replaces up to `k` points (2 or 3) of a hitting set by fewer, as long as it can. With k = 3 the result has at
 // most 8 times the optimum's points, and that is tight. [Theorem 8.1]
 // `start` must hit every disk. Found by neighbourhood enumeration on the reduced instance, not by the structures of
-// sec. 8.3 (docs/decisions/geometry-local-search.md).
+// sec. 8.3 (docs/decisions/0010-geometry-local-search.md).
 std::vector<uint32_t> improve_hitting_set(std::span<const Point2> points, std::span<const Disk> disks,
                                           std::span<const uint32_t> start, int k);
 

@@ -18,7 +18,7 @@ constexpr double dist2(const Point2& a, const Point2& b) {
   return dx * dx + dy * dy;
 }
 
-// Disks are closed. This one test decides everywhere in the house, so that every solver and oracle sees the same
+// Disks are closed. This one test decides everywhere in geometry/, so that every solver and oracle sees the same
 // instance.
 constexpr bool hits(const Point2& p, const Disk& d) { return dist2(p, d.centre) <= d.radius * d.radius; }
 

@@ -3,7 +3,7 @@
 // Eq. 3.3-3.4] Departs: 16 point clusters are tested against a light cluster at once, and the 256 points of a group
 // descend the light tree together, each with bounds of its own at the end, so that a pair is dense SIMD loops and
 // shadow packets; phase I keeps irradiance, so that textures are no error of it; see
-// docs/decisions/illumination-cut.md
+// docs/decisions/0006-illumination-cut.md
 #include <array>
 #include <bit>
 #include <memory>

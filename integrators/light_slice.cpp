@@ -1,7 +1,8 @@
 // LightSlice: points in slices; lights clustered for each slice by what they give to it and its neighbours, as sampled
 // rows of the light transport matrix tell, shadows included. [Ou and Pellacini 2011, sec. 4]
 // Departs: slices are worked off in groups of 32 neighbours. A group's rows alone are in memory, and its initial
-// clustering, where the paper has one of the whole matrix, is the group's own. docs/decisions/light-slice-groups.md
+// clustering, where the paper has one of the whole matrix, is the group's own.
+// docs/decisions/0011-light-slice-groups.md
 #include <tbb/task_arena.h>
 
 #include <array>

@@ -2,7 +2,7 @@
 // pairs bounds the error of the pixel's sum. [Walter et al. 2006; trees: Walter et al. 2008, sec. 5]
 // Departs: 16 pixels descend together, as points do in lightcuts.cpp; a pixel's point tree is 16-wide, so that a
 // pixel's children are one SIMD evaluation and one packet; and each light cluster looks at another random point of a
-// cluster, so that the errors of a pixel's pairs are independent. docs/decisions/multidimensional-lightcuts.md
+// cluster, so that the errors of a pixel's pairs are independent. docs/decisions/0013-multidimensional-lightcuts.md
 #include <array>
 #include <bit>
 #include <memory>

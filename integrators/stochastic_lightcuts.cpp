@@ -4,7 +4,7 @@
 // - 16 neighbouring points share a cut, chosen by the sum of their error bounds; each draws lights of its own.
 // - Within a cluster that is small as seen from the point, lights are drawn by intensity alone, in one step; the
 //   descent by distance and orientation goes on only as long as they matter.
-//   docs/decisions/stochastic-lightcuts-descent.md
+//   docs/decisions/0012-stochastic-lightcuts-descent.md
 #include <memory>
 
 #include "bsdf/point_bsdf.h"

@@ -2,7 +2,7 @@
 // takes that of a light near it, and splits what stands too near. [Bus, Mustafa and Biri 2015; thesis ch. 2, Alg. 2,
 // Eq. 2.2] Departs: blocks of neighbouring points share a clustering, well-separated from the whole block; visibility
 // of a cluster is taken from 16 of the block's points where these agree; bright clusters are split where their radiance
-// is known, at the block, not by estimates between pairs. docs/decisions/wspd-blocks.md
+// is known, at the block, not by estimates between pairs. docs/decisions/0007-wspd-blocks.md
 #include <memory>
 #include <numeric>
 

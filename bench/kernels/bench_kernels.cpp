@@ -7,11 +7,11 @@
 #include <cstdlib>
 
 #include "accel/embree_api.h"
+#include "bench/bvh/meshes.h"
 #include "clusters/light_kernel.h"
 #include "clusters/light_tree.h"
 #include "core/parallel.h"
 #include "integrators/integrator.h"
-#include "meshes.h"
 #include "vpl/emitters.h"
 #include "vpl/trace_vpls.h"
 

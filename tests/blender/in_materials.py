@@ -79,7 +79,7 @@ COAT, COAT_ROUGHNESS = "Clearcoat|Coat Weight", "Clearcoat Roughness|Coat Roughn
 
 def cases():
     """(name, material, whether on a board, tolerance of the region's mean: why it is more than one per cent stands in
-    docs/decisions/ggx.md)"""
+    docs/decisions/0014-ggx.md)"""
     yield "diffuse", h.diffuse((0.5, 0.5, 0.5)), False, 0.01
     for roughness in (0.2, 0.5, 0.9):
         yield f"metal {roughness}", principled("Metal", **{"Base Color": GOLD, "Metallic": 1.0, "Roughness": roughness})[0], False, 0.035

@@ -376,7 +376,7 @@ TEST(Errors, ThereAreNoExtensionsYet) {
   EXPECT_EQ(lumicut_get_extension("lumicut.anything"), nullptr);
   EXPECT_EQ(lumicut_get_extension(nullptr), nullptr);
   uint32_t major = 9, minor = 9;
-  EXPECT_STREQ(lumicut_version(&major, &minor), "1.0.0");
+  EXPECT_STREQ(lumicut_version(&major, &minor), LUMICUT_VERSION_TEXT);
   EXPECT_EQ(major, uint32_t{LUMICUT_ABI_MAJOR});
   EXPECT_EQ(minor, uint32_t{LUMICUT_ABI_MINOR});
 }

@@ -14,6 +14,7 @@ CMAKE = os.environ.get("LUMICUT_CMAKE", "cmake")
 INCLUDE = ROOT / "plugin/include"
 HEADER = INCLUDE / "lumicut/lumicut.h"
 LIBRARY = BUILD / "lib/liblumicut.so"
+VERSION = re.search(r"^project\(lumicut VERSION ([\d.]+) ", (ROOT / "CMakeLists.txt").read_text(), re.MULTILINE)[1]
 
 
 def run(*command, **options):
@@ -123,18 +124,18 @@ class Install(unittest.TestCase):
         build = self.project / "build"
         run(CMAKE, "-S", self.project, "-B", build, f"-DCMAKE_PREFIX_PATH={self.prefix}", f"-DCMAKE_CXX_COMPILER={CXX}")
         run(CMAKE, "--build", build)
-        self.assertEqual(run(build / "host"), "Lumicut 1.0.0, 60000 lights")
+        self.assertEqual(run(build / "host"), f"Lumicut {VERSION}, 60000 lights")
 
     @unittest.skipUnless(shutil.which("pkg-config"), "pkg-config is not installed")
     def test_a_project_finds_it_with_pkg_config(self):
         folder = next(self.prefix.rglob("lumicut.pc")).parent
         environment = {**os.environ, "PKG_CONFIG_PATH": str(folder)}
         flags = run("pkg-config", "--cflags", "--libs", "lumicut", env=environment).split()
-        self.assertEqual(run("pkg-config", "--modversion", "lumicut", env=environment).strip(), "1.0.0")
+        self.assertEqual(run("pkg-config", "--modversion", "lumicut", env=environment).strip(), VERSION)
         program = self.project / "with_pkg_config"
         run(CXX, "-std=c++17", self.project / "main.cpp", "-o", program, *flags,
             f"-Wl,-rpath,{next(self.prefix.rglob('liblumicut.so')).parent}")
-        self.assertEqual(run(program), "Lumicut 1.0.0, 60000 lights")
+        self.assertEqual(run(program), f"Lumicut {VERSION}, 60000 lights")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Looks at the sources without running them: format, Python, scripts; with --tidy clang-tidy too, which takes minutes.
-# Prints what fails, all of it.
+# Checks the sources without building them: format, Python, scripts; with --tidy clang-tidy too, which takes minutes.
+# Prints all findings, not only the first.
 set -uo pipefail
 cd "$(dirname "$0")/../.." || exit
 failed=''
@@ -13,7 +13,7 @@ look() {
 files() { find . \( -name build -o -name out -o -name .git \) -prune -o -type f \( "$@" \) -print; }
 mapfile -t cpp < <(files -name '*.cpp' -o -name '*.h' -o -name '*.hpp' -o -name '*.c')
 mapfile -t python < <(files -name '*.py')
-mapfile -t scripts < <(files -name '*.sh' -o -path './.ci/*')
+mapfile -t scripts < <(files -name '*.sh' -o -path './.ci/*' -o -path './tools/dev/pre-commit')
 
 look format clang-format --dry-run -Werror "${cpp[@]}"
 look flake8 flake8 --isolated --select=E9,F "${python[@]}"  # E9: syntax; F: pyflakes
