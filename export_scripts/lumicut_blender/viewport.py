@@ -220,7 +220,7 @@ class Session:
 
 
 def scene_is_transparent(data):
-    return data is not None and data.environment is not None and bool(data.environment.flags & library.ENVIRONMENT_HIDDEN)
+    return data is not None and data.environment is not None and bool(data.environment.flags & library.HIDDEN)
 
 
 def _tick():
