@@ -127,9 +127,7 @@ class ErrorsCommand {
   io::Handle<lumicut_integrator> like_method(const char* id) const {
     io::Handle<lumicut_integrator> other(api());
     io::check(api(), api().integrator_create(device_.get(), id, other.out()), id);
-    lumicut_param_info info{};
-    info.struct_size = sizeof(info);
-    for (uint32_t i = 0; api().get_param_info(id, i, &info) == LUMICUT_OK; ++i)
+    for (const auto& info : api::params(id, api()))
       if (const char* value = api().integrator_get(method_.get(), info.id)) set(other, info.id, value);
     return other;
   }

@@ -13,13 +13,10 @@ using nlohmann::ordered_json;
 
 namespace {
 
-ordered_json parameters(const io::Api& api, const char* integrator, uint32_t count) {
+ordered_json parameters(const io::Api& api, const char* integrator) {
   static const char* const kTypes[] = {"float", "int", "bool", "choice"};
   ordered_json list = ordered_json::array();
-  for (uint32_t i = 0; i < count; ++i) {
-    lumicut_param_info p{};
-    p.struct_size = sizeof(p);
-    io::check(api, api.get_param_info(integrator, i, &p), "parameter information");
+  for (const auto& p : api::params(integrator, api)) {
     ordered_json entry = {{"id", p.id}, {"type", p.type < 4 ? kTypes[p.type] : "?"}, {"default", p.default_text}};
     if (p.type <= LUMICUT_INT) entry["minimum"] = p.minimum, entry["maximum"] = p.maximum;
     if (p.type == LUMICUT_CHOICE) entry["choices"] = p.choices;
@@ -36,24 +33,16 @@ ordered_json describe(const io::Library& library) {
   all["abi"] = fmt::format("{}.{}", major, minor);
   all["library"] = library.path();
   all["integrators"] = ordered_json::array();
-  for (uint32_t i = 0;; ++i) {
-    lumicut_integrator_info info{};
-    info.struct_size = sizeof(info);
-    if (api.get_integrator_info(i, &info) != LUMICUT_OK) break;
+  for (const auto& info : api::integrators(api))
     all["integrators"].push_back({{"id", info.id},
                                   {"label", info.label},
                                   {"description", info.description},
                                   {"source", info.source},
-                                  {"parameters", parameters(api, info.id, info.param_count)}});
-  }
+                                  {"parameters", parameters(api, info.id)}});
   all["channels"] = ordered_json::array();
-  for (uint32_t i = 0;; ++i) {
-    lumicut_channel_info info{};
-    info.struct_size = sizeof(info);
-    if (api.get_channel_info(i, &info) != LUMICUT_OK) break;
+  for (const auto& info : api::channels(api))
     all["channels"].push_back(
         {{"name", info.name}, {"components", info.components}, {"description", info.description}});
-  }
   return all;
 }
 

@@ -53,10 +53,7 @@ struct Channel {
 std::vector<Channel> choose_channels(const io::Api& api, const std::string& asked) {
   std::vector<Channel> known;
   std::string names;
-  for (uint32_t i = 0;; ++i) {
-    lumicut_channel_info info{};
-    info.struct_size = sizeof(info);
-    if (api.get_channel_info(i, &info) != LUMICUT_OK) break;
+  for (const auto& info : api::channels(api)) {
     known.push_back({info.name, static_cast<int>(info.components)});
     names += (names.empty() ? "" : ", ") + known.back().name;
   }
@@ -475,10 +472,7 @@ class RenderCommand {
     stats["robust"] = o_.rays == "robust";
     stats["threads"] = o_.threads;
     ordered_json parameters = ordered_json::object();
-    for (uint32_t i = 0;; ++i) {
-      lumicut_param_info info{};
-      info.struct_size = sizeof(info);
-      if (api().get_param_info(o_.integrator.c_str(), i, &info) != LUMICUT_OK) break;
+    for (const auto& info : api::params(o_.integrator, api())) {
       const char* value = api().integrator_get(integrator_.get(), info.id);
       parameters[info.id] = value ? value : "";
     }

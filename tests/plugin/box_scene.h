@@ -107,8 +107,7 @@ inline api::Integrator integrator(const api::Device& device, int vpls = 400, con
 
 inline std::vector<std::string> integrator_ids() {
   std::vector<std::string> ids;
-  auto info = make<lumicut_integrator_info>();
-  while (lumicut_get_integrator_info(static_cast<uint32_t>(ids.size()), &info) == LUMICUT_OK) ids.emplace_back(info.id);
+  for (const auto& info : api::integrators()) ids.emplace_back(info.id);
   return ids;
 }
 

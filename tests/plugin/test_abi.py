@@ -10,7 +10,7 @@ import abi
 
 ROOT = abi.ROOT
 DESCRIPTORS, MAP = "plugin/descriptors.h", "plugin/lumicut.map"
-PYTHON, PAGE = "export_scripts/lumicut_blender/library.py", "docs/c_abi.md"
+WRAPPER, PYTHON, PAGE = "plugin/include/lumicut/lumicut.hpp", "export_scripts/lumicut_blender/library.py", "docs/c_abi.md"
 SCALARS = {"float": ctypes.c_float, "double": ctypes.c_double, "int32_t": ctypes.c_int32, "uint32_t": ctypes.c_uint32,
            "uint64_t": ctypes.c_uint64, "lumicut_result": ctypes.c_int32, "void": None}
 
@@ -40,6 +40,16 @@ def of_descriptors(header, text):
 
 def of_map(header, text):
     return differences(MAP, "", re.findall(r"^\s+(lumicut_\w+);", text, re.M), header.functions)
+
+
+def of_wrapper(header, text):
+    """Its table has every function, and its classes call each."""
+    table = re.search(r"#define LUMICUT_FOR_ALL_FUNCTIONS\(X\)(.*?[^\\])\n", text, re.S)
+    listed = ["lumicut_" + name for name in re.findall(r"X\((\w+)\)", table[1])]
+    lines = differences(f"{WRAPPER}: LUMICUT_FOR_ALL_FUNCTIONS", "", listed, header.functions)
+    lines += [f"{WRAPPER}: LUMICUT_FOR_ALL_FUNCTIONS has {name} twice" for name in set(listed) if listed.count(name) > 1]
+    called = set(re.findall(r"(?:\.|->)(\w+)\(", text[table.end():]))
+    return lines + [f"{WRAPPER}: nothing in it calls {name}" for name in header.functions if name[len("lumicut_"):] not in called]
 
 
 def of_page(header, text):
@@ -125,7 +135,7 @@ def python_module():
 
 def all_differences(header, module):
     return (of_descriptors(header, text_of(DESCRIPTORS)) + of_map(header, text_of(MAP)) +
-            of_page(header, text_of(PAGE)) + Ctypes(header, module).lines())
+            of_wrapper(header, text_of(WRAPPER)) + of_page(header, text_of(PAGE)) + Ctypes(header, module).lines())
 
 
 class OneList(unittest.TestCase):
@@ -154,7 +164,9 @@ class OneList(unittest.TestCase):
 
     def test_a_function_in_the_header_alone_is_missed_everywhere(self):
         lines = self.of("LUMICUT_API void lumicut_retain(", "LUMICUT_API void lumicut_dim(void* handle);\nLUMICUT_API void lumicut_retain(")
-        self.assertEqual(lines, [f"{MAP}: lacks lumicut_dim", f"{PAGE}: lacks `lumicut_dim`", f"{PYTHON}: lacks lumicut_dim"])
+        self.assertEqual(lines, [f"{MAP}: lacks lumicut_dim", f"{WRAPPER}: LUMICUT_FOR_ALL_FUNCTIONS: lacks lumicut_dim",
+                                 f"{WRAPPER}: nothing in it calls lumicut_dim", f"{PAGE}: lacks `lumicut_dim`",
+                                 f"{PYTHON}: lacks lumicut_dim"])
 
     def test_a_structure_or_constant_in_the_header_alone_is_missed(self):
         lines = self.of("typedef struct lumicut_tile {", "typedef struct lumicut_dim {\n  uint32_t struct_size;\n} lumicut_dim;\n\ntypedef struct lumicut_tile {")
