@@ -11,6 +11,7 @@
 #include "io/file_error.h"
 #include "io/json_reader.h"
 #include "tools/bench_references.h"
+#include "tools/render_setup.h"
 
 namespace lumicut::tools {
 
@@ -62,7 +63,7 @@ class PlanReader {
       known_run(*baseline, plan_.baseline);
     } else {
       for (auto r = plan_.runs.rbegin(); r != plan_.runs.rend(); ++r)
-        if (r->integrator == "lightcuts") plan_.baseline = r->name;
+        if (r->integrator == kUsualIntegrator) plan_.baseline = r->name;
     }
     top.finish();
     return std::move(plan_);

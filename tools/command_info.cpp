@@ -26,6 +26,28 @@ ordered_json parameters(const io::Api& api, const char* integrator) {
   return list;
 }
 
+ordered_json traits(const lumicut_integrator_info& info) {
+  static constexpr std::pair<uint32_t, const char*> kNames[] = {
+      {LUMICUT_VIRTUAL_LIGHTS, "virtual_lights"},     {LUMICUT_LIGHT_GROUPS, "light_groups"},
+      {LUMICUT_COMPENSATION, "compensation"},         {LUMICUT_SAVED_STATE, "saved_state"},
+      {LUMICUT_VIEW_INDEPENDENT, "view_independent"}, {LUMICUT_ALL_LIGHTS, "all_lights"}};
+  ordered_json names = ordered_json::array();
+  for (const auto& [flag, name] : kNames)
+    if ((info.traits & flag) != 0) names.push_back(name);
+  return names;
+}
+
+ordered_json presets(const lumicut_integrator_info& info) {
+  ordered_json all = ordered_json::object();
+  for (const auto& [name, text] : {std::pair{"interactive", info.interactive},
+                                   {"preview", info.preview},
+                                   {"draft", info.draft},
+                                   {"good", info.good},
+                                   {"reference", info.reference}})
+    if (text != nullptr && *text != 0) all[name] = text;
+  return all;
+}
+
 ordered_json describe(const io::Library& library) {
   const io::Api& api = library.api();
   uint32_t major = 0, minor = 0;
@@ -38,6 +60,8 @@ ordered_json describe(const io::Library& library) {
                                   {"label", info.label},
                                   {"description", info.description},
                                   {"source", info.source},
+                                  {"traits", traits(info)},
+                                  {"presets", presets(info)},
                                   {"parameters", parameters(api, info.id)}});
   all["channels"] = ordered_json::array();
   for (const auto& info : api::channels(api))
@@ -52,6 +76,8 @@ void print_text(const ordered_json& all) {
   fmt::print("lumicut {}, ABI {}, {}\n", text(all["version"]), text(all["abi"]), text(all["library"]));
   for (const auto& integrator : all["integrators"]) {
     fmt::print("\n{}: {}\n  {}\n", text(integrator["id"]), text(integrator["description"]), text(integrator["source"]));
+    for (const auto& [name, parameters] : integrator["presets"].items())
+      fmt::print("  {}: {}\n", name, text(parameters));
     for (const auto& p : integrator["parameters"]) {
       std::string range = text(p["type"]);
       if (p.contains("minimum"))

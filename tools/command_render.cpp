@@ -33,7 +33,7 @@ using nlohmann::ordered_json;
 namespace {
 
 struct Options : RenderSetup {
-  Options() { integrator = "lightcuts"; }
+  Options() { integrator = kUsualIntegrator; }
   std::string scene, output, png, stats, vpl_in, vpl_out, size, crop, layers, heat_maps, checkpoint;
   uint32_t samples = 0, squares = 0, passes = 0;
   double seconds = 0, target_error = 0, confidence = 0;
@@ -158,6 +158,8 @@ class RenderCommand {
 
   void create_integrator() {
     create_integrator(integrator_);
+    if (o_.groups && lacks(integrator_info(api(), o_.integrator), LUMICUT_LIGHT_GROUPS))
+      throw UsageError(fmt::format("--groups: {} cannot tell light groups apart", o_.integrator));
     if (o_.vpl_in.empty()) return;
     const NothingToLose reading;
     lights_ = io::read_vpls(o_.vpl_in);

@@ -80,6 +80,12 @@ void create_integrator(const io::Api& api, const RenderSetup& setup, lumicut_dev
   }
 }
 
+lumicut_integrator_info integrator_info(const io::Api& api, const std::string& id) {
+  for (const auto& info : api::integrators(api))
+    if (id == info.id) return info;
+  throw UsageError(fmt::format("the library has no integrator \"{}\"", id));
+}
+
 CLI::Validator number_in(double low, double high) {
   return {[low, high](std::string& text) {
             double value = 0;

@@ -10,11 +10,12 @@ import json
 import os
 import pathlib
 import sys
+import typing
 from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int32, c_uint32, c_uint64, c_void_p
 
 import numpy as np
 
-ABI_MAJOR, ABI_MINOR = 1, 3
+ABI_MAJOR, ABI_MINOR = 1, 4
 OK, INVALID_ARGUMENT, INVALID_STATE, UNSUPPORTED, OUT_OF_MEMORY, CANCELLED, INTERNAL = range(7)
 IDLE, RUNNING, DONE, STOPPED, FAILED = range(5)
 FLOAT, INT, BOOL, CHOICE = range(4)
@@ -26,6 +27,7 @@ POINT, SPOT, RECTANGLE, DISK, SUN = range(5)
 RADIOMETRIC, WATT = 0, 1
 HIDDEN = 1  # of Environment.flags
 CHECKPOINTS, ILLUMINANCE, GROUPS = 1, 2, 4  # of RenderDesc.flags
+VIRTUAL_LIGHTS, LIGHT_GROUPS, COMPENSATION, SAVED_STATE, VIEW_INDEPENDENT, ALL_LIGHTS = 1, 2, 4, 8, 16, 32  # traits
 VPL_OMNI, VPL_ORIENTED, VPL_DIRECTIONAL, VPL_SPOT, VPL_SPHERE = range(5)
 FOREVER = NO_ID = 0xFFFFFFFF
 
@@ -175,7 +177,9 @@ class Camera(Descriptor):
 
 class IntegratorInfo(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("param_count", c_uint32), ("id", c_char_p), ("label", c_char_p),
-                ("description", c_char_p), ("source", c_char_p)]
+                ("description", c_char_p), ("source", c_char_p), ("traits", c_uint32), ("reserved", c_uint32),
+                ("interactive", c_char_p), ("preview", c_char_p), ("draft", c_char_p), ("good", c_char_p),
+                ("reference", c_char_p)]
 
 
 class ParamInfo(Descriptor):
@@ -202,7 +206,7 @@ class ChannelInfo(Descriptor):
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
 SIZES = {Ray: 48, Hit: 32, Rayhit: 80, Vpl: 64, Point: 64, DeviceDesc: 32, Status: 64, AccelDesc: 80, AccelInfo: 80,
          AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 32, Material: 124, Mesh: 88, Light: 116, Profile: 40,
-         Environment: 64, Camera: 92, IntegratorInfo: 40, ParamInfo: 72, RenderDesc: 72, Tile: 20, ChannelInfo: 24}
+         Environment: 64, Camera: 92, IntegratorInfo: 88, ParamInfo: 72, RenderDesc: 72, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32
 HANDLE = c_void_p
@@ -294,6 +298,21 @@ def load_file(path):
     return dll, version, (major.value, minor.value)
 
 
+QUALITIES = ("interactive", "preview", "draft", "good", "reference")  # fields of IntegratorInfo
+ANY_TRAIT = VIRTUAL_LIGHTS | LIGHT_GROUPS | COMPENSATION  # of libraries before ABI 1.4, which do not tell
+
+
+class IntegratorRow(typing.NamedTuple):
+    """All texts str. `traits`: VIRTUAL_LIGHTS ...; `presets`: {quality: {parameter: text}}, empty without a suggestion."""
+    id: str
+    label: str
+    description: str
+    source: str
+    parameters: list
+    traits: int
+    presets: dict
+
+
 class Library:
     """The loaded library and its tables. Raises Error where a call fails, Cancelled where it was cancelled."""
 
@@ -317,7 +336,7 @@ class Library:
         raise (Cancelled if code == CANCELLED else Error)(code, text or f"error {code}")
 
     def integrators(self):
-        """[(id, label, description, source, [parameters])], as the library declares them; all texts str."""
+        """[IntegratorRow] as the library declares them."""
         result = []
         while True:
             info = IntegratorInfo()
@@ -330,8 +349,10 @@ class Library:
                 parameters.append({name: getattr(p, name).decode() for name in
                                    ("id", "label", "description", "unit", "choices", "default_text")} |
                                   {"type": p.type, "minimum": p.minimum, "maximum": p.maximum})
-            result.append((info.id.decode(), info.label.decode(), info.description.decode(), info.source.decode(),
-                           parameters))
+            presets = {name: dict(pair.split("=", 1) for pair in (getattr(info, name) or b"").decode().split())
+                       for name in QUALITIES}
+            result.append(IntegratorRow(info.id.decode(), info.label.decode(), info.description.decode(),
+                                        info.source.decode(), parameters, info.traits or ANY_TRAIT, presets))
 
     def channels(self):
         """{name: components}"""

@@ -111,6 +111,12 @@ inline std::vector<std::string> integrator_ids() {
   return ids;
 }
 
+inline bool has_virtual_lights(const std::string& id) {
+  for (const auto& info : api::integrators())
+    if (id == info.id) return (info.traits & LUMICUT_VIRTUAL_LIGHTS) != 0;
+  return false;
+}
+
 inline lumicut_render_desc frame(uint32_t width = 48, uint32_t height = 32) {
   auto d = make<lumicut_render_desc>();
   d.width = width, d.height = height, d.tile_size = 16;

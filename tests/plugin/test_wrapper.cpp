@@ -81,7 +81,7 @@ void lead_a_hosts_life() {
   EXPECT_NE(s.status().state, LUMICUT_FAILED);
 
   api::Integrator i(device, "exhaustive");
-  EXPECT_EQ(i.set("vpls", "50").set("seed", "3").value("seed"), "3");
+  EXPECT_EQ(i.set("vpls", "50").apply("seed=3").value("seed"), "3");
   EXPECT_THROW(i.value("no_such"), api::Exception);
   i.prepare(s);
   i.set_lights(i.lights());

@@ -64,7 +64,7 @@ extern "C" {
 #endif
 
 #define LUMICUT_ABI_MAJOR 1
-#define LUMICUT_ABI_MINOR 3
+#define LUMICUT_ABI_MINOR 4
 #define LUMICUT_FOREVER 0xffffffffu /* milliseconds */
 #define LUMICUT_NO_ID 0xffffffffu   /* no hit, no child */
 
@@ -307,7 +307,23 @@ typedef struct lumicut_integrator_info {
   uint32_t struct_size;
   uint32_t param_count;
   const char *id, *label, *description, *source; /* source: the paper */
+  uint32_t traits;      /* LUMICUT_VIRTUAL_LIGHTS ...; 0: a library before 1.4, which does not tell; every integrator has one */
+  uint32_t reserved;
+  /* Suggested parameters by purpose, "name=value name=value"; "": no suggestion, NULL: before 1.4. Others keep their defaults. */
+  const char* interactive; /* coarse pictures while a view moves */
+  const char* preview;     /* small pictures within a second */
+  const char* draft;       /* a first look at a frame */
+  const char* good;        /* most frames */
+  const char* reference;   /* what others are measured against, in many passes */
 } lumicut_integrator_info;
+enum {
+  LUMICUT_VIRTUAL_LIGHTS = 1,   /* shades by virtual lights: has their parameters, and lights to get and set */
+  LUMICUT_LIGHT_GROUPS = 2,     /* takes LUMICUT_GROUPS; without it a render with that flag is refused */
+  LUMICUT_COMPENSATION = 4,     /* "compensate" brings back what the clamp takes */
+  LUMICUT_SAVED_STATE = 8,      /* lumicut_state.h saves and loads what it prepared */
+  LUMICUT_VIEW_INDEPENDENT = 16, /* another camera repeats no preparation: nothing is clustered by what is seen */
+  LUMICUT_ALL_LIGHTS = 32       /* sums every virtual light at every point: no error of clustering */
+};
 
 typedef struct lumicut_param_info {
   uint32_t struct_size;

@@ -330,6 +330,18 @@ class Integrator : public Handle<lumicut_integrator> {
     check(functions(), functions().integrator_set(get(), name, value.c_str()));
     return *this;
   }
+  // Of lumicut_integrator_info, such as `good`: "name=value name=value". NULL sets nothing.
+  Integrator& apply(const char* preset) {
+    std::string rest = preset != nullptr ? preset : "";
+    while (!rest.empty()) {
+      const std::string pair = rest.substr(0, rest.find(' '));
+      rest.erase(0, pair.size() + 1);
+      const size_t equals = pair.find('=');
+      if (equals == std::string::npos) throw Exception(LUMICUT_INVALID_ARGUMENT, "preset: \"" + pair + "\" has no =");
+      set(pair.substr(0, equals).c_str(), pair.substr(equals + 1));
+    }
+    return *this;
+  }
   std::string value(const char* name) const {
     const char* text = functions().integrator_get(get(), name);
     if (text == nullptr) throw Exception(LUMICUT_INVALID_ARGUMENT, functions().last_error());
