@@ -1,18 +1,32 @@
-#include "integrators/integrator.h"
+#include "integrators/traits.h"
+
+#include <string_view>
+#include <utility>
 
 namespace lumicut {
 
-#define LUMICUT_INTEGRATOR(name) extern const IntegratorEntry name##_integrator;
+#define LUMICUT_INTEGRATOR(name, ...) extern const IntegratorEntry name##_integrator;
 #include "integrators/integrator_list.inc"
 #undef LUMICUT_INTEGRATOR
 
 std::span<const IntegratorEntry> integrators() {
   static const IntegratorEntry table[] = {
-#define LUMICUT_INTEGRATOR(name) name##_integrator,
+#define LUMICUT_INTEGRATOR(name, ...) name##_integrator,
 #include "integrators/integrator_list.inc"
 #undef LUMICUT_INTEGRATOR
   };
   return table;
+}
+
+IntegratorTraits traits(const IntegratorEntry& entry) {
+  static constexpr std::pair<std::string_view, IntegratorTraits> table[] = {
+#define LUMICUT_INTEGRATOR(name, ...) {#name, {__VA_ARGS__}},
+#include "integrators/integrator_list.inc"
+#undef LUMICUT_INTEGRATOR
+  };
+  for (const auto& [id, of] : table)
+    if (id == entry.id) return of;
+  return {};
 }
 
 const IntegratorEntry* find_integrator(const std::string& id) {

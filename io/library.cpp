@@ -40,34 +40,15 @@ Library::Library() {
   if (!handle_)
     throw LibraryError(LUMICUT_UNSUPPORTED,
                        "the Lumicut library cannot be loaded (LUMICUT_LIBRARY may name it):" + tried);
-  const auto load = [&](const char* name) {
-    void* symbol = dlsym(handle_, name);
-    if (!symbol) throw LibraryError(LUMICUT_UNSUPPORTED, fmt::format("{} lacks the function {}", path_, name));
-    return symbol;
-  };
   try {
-#define LUMICUT_LOAD(name) api_.name = reinterpret_cast<decltype(api_.name)>(load("lumicut_" #name));
-    LUMICUT_FOR_ALL_FUNCTIONS(LUMICUT_LOAD)
-#undef LUMICUT_LOAD
-    uint32_t major = 0, minor = 0;
-    api_.version(&major, &minor);
-    if (major != LUMICUT_ABI_MAJOR)
-      throw LibraryError(LUMICUT_UNSUPPORTED, fmt::format("{} speaks version {}.{} of the ABI; {} is needed", path_,
-                                                          major, minor, LUMICUT_ABI_MAJOR));
-  } catch (...) {
+    api_ = api::load([this](const char* name) { return dlsym(handle_, name); });
+  } catch (const LibraryError& error) {
     dlclose(handle_);
-    throw;
+    throw LibraryError(error.code(), fmt::format("{} {}", path_, error.what()));
   }
 }
 
 // Not closed: its worker threads may still be winding down, and the program ends soon.
 Library::~Library() = default;
-
-void check(const Api& api, lumicut_result code, const std::string& doing) {
-  if (code == LUMICUT_OK) return;
-  const char* text = api.last_error();
-  throw LibraryError(
-      code, fmt::format("{}: {}", doing, text && *text ? text : fmt::format("failed with code {}", code).c_str()));
-}
 
 }  // namespace lumicut::io

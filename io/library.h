@@ -1,41 +1,16 @@
-// The Lumicut library, loaded while the program runs: a table of its functions. Nothing here links it.
+// The Lumicut library, loaded while the program runs. Nothing here links it. Handles and errors are the wrapper's.
 #pragma once
 
-#include <stdexcept>
 #include <string>
-#include <utility>
 
-#include "lumicut/lumicut.h"
+#include "lumicut/lumicut.hpp"
 
 namespace lumicut::io {
 
-// Every function of lumicut.h, under its name without "lumicut_".
-// clang-format off
-#define LUMICUT_FOR_ALL_FUNCTIONS(X)                                                                                         \
-  X(version) X(last_error) X(get_extension) X(device_create) X(retain) X(release) X(get_status) X(cancel) X(stats_json)      \
-  X(accel_build) X(accel_get_info) X(accel_get_node) X(accel_get_primitives) X(accel_intersect) X(accel_occluded)            \
-  X(scene_create) X(scene_set_textures) X(scene_set_materials) X(scene_add_mesh) X(scene_update_mesh) X(scene_set_profiles)  \
-  X(scene_set_lights) X(scene_set_environment) X(scene_set_camera) X(scene_set_trace) X(scene_commit)                        \
-  X(get_integrator_info) X(get_param_info) X(integrator_create) X(integrator_set) X(integrator_get) X(integrator_set_lights) \
-  X(integrator_prepare) X(integrator_get_lights) X(integrator_shade) X(get_channel_info)                                     \
-  X(render_start) X(render_wait) X(render_next_tile) X(render_read) X(render_groups) X(render_checkpoint)
-// clang-format on
-
-struct Api {
-#define LUMICUT_MEMBER(name) decltype(&lumicut_##name) name = nullptr;
-  LUMICUT_FOR_ALL_FUNCTIONS(LUMICUT_MEMBER)
-#undef LUMICUT_MEMBER
-};
-
-// What a call of the library refused, with the library's own text.
-class LibraryError : public std::runtime_error {
- public:
-  LibraryError(lumicut_result code, const std::string& text) : std::runtime_error(text), code_(code) {}
-  lumicut_result code() const { return code_; }
-
- private:
-  lumicut_result code_;
-};
+using Api = api::Functions;
+using LibraryError = api::Exception;
+using api::check;
+using api::Handle;
 
 class Library {
  public:
@@ -54,29 +29,6 @@ class Library {
   void* handle_ = nullptr;
   std::string path_;
   Api api_;
-};
-
-// Throws LibraryError(code, "<doing>: <the library's text>") unless `code` is LUMICUT_OK.
-void check(const Api& api, lumicut_result code, const std::string& doing);
-
-// A counted handle, released at the end of its scope.
-template <typename T>
-class Handle {
- public:
-  explicit Handle(const Api& api) : api_(&api) {}
-  ~Handle() { reset(); }
-  Handle(Handle&& other) noexcept : api_(other.api_), handle_(std::exchange(other.handle_, nullptr)) {}
-  Handle(const Handle&) = delete;
-  Handle& operator=(const Handle&) = delete;
-  void reset() {
-    if (handle_) api_->release(std::exchange(handle_, nullptr));
-  }
-  T get() const { return handle_; }
-  T* out() { return &handle_; }
-
- private:
-  const Api* api_;
-  T handle_ = nullptr;
 };
 
 }  // namespace lumicut::io

@@ -1,6 +1,7 @@
 // Level 3: integrators, their parameters, their lights, and shading of a host's points.
 #include <map>
 
+#include "integrators/traits.h"
 #include "plugin/check.h"
 #include "plugin/convert.h"
 #include "plugin/descriptors.h"
@@ -21,6 +22,16 @@ const IntegratorEntry& entry_named(const char* id) {
   std::string known;
   for (const IntegratorEntry& e : integrators()) known += (known.empty() ? "" : ", ") + std::string(e.id);
   fail_argument(std::string("integrator: \"") + id + "\" is not known; there are: " + known);
+}
+
+uint32_t trait_flags(const IntegratorEntry& entry, const IntegratorTraits& t) {
+  uint32_t flags = 0;
+  if (entry.light_source == LightSource::virtual_lights)
+    flags |= LUMICUT_VIRTUAL_LIGHTS | LUMICUT_LIGHT_GROUPS | LUMICUT_COMPENSATION;
+  if (t.saved_state) flags |= LUMICUT_SAVED_STATE;
+  if (t.view_independent) flags |= LUMICUT_VIEW_INDEPENDENT;
+  if (t.all_lights) flags |= LUMICUT_ALL_LIGHTS;
+  return flags;
 }
 
 // First and last points of each batch. A pixel's points stay together, and batches depend on the input alone.
@@ -47,6 +58,10 @@ lumicut_result lumicut_get_integrator_info(uint32_t index, lumicut_integrator_in
     lumicut_integrator_info out{};
     out.param_count = static_cast<uint32_t>(effective_params(e).size());
     out.id = e.id, out.label = e.label, out.description = e.description, out.source = e.source;
+    const IntegratorTraits t = traits(e);
+    out.traits = trait_flags(e, t);
+    out.interactive = t.interactive, out.preview = t.preview, out.draft = t.draft, out.good = t.good;
+    out.reference = t.reference;
     write(info, out);
   });
 }

@@ -53,7 +53,8 @@ LUMICUT_DESCRIPTOR(lumicut_environment, F(struct_size), F(group), F(color), F(te
 LUMICUT_DESCRIPTOR(lumicut_camera, F(struct_size), F(orthographic), F(to_world), F(fov_y), F(height), F(shift),
                    F(near_clip), F(far_clip), F(pixel_aspect), F(lens_radius), F(focus_distance));
 LUMICUT_DESCRIPTOR(lumicut_trace, F(struct_size), F(batch), F(intersect), F(occluded), F(user));
-LUMICUT_DESCRIPTOR(lumicut_integrator_info, F(struct_size), F(param_count), F(id), F(label), F(description), F(source));
+LUMICUT_DESCRIPTOR(lumicut_integrator_info, F(struct_size), F(param_count), F(id), F(label), F(description), F(source),
+                   F(traits), F(reserved), F(interactive), F(preview), F(draft), F(good), F(reference));
 LUMICUT_DESCRIPTOR(lumicut_param_info, F(struct_size), F(type), F(id), F(label), F(description), F(unit), F(choices),
                    F(default_text), F(minimum), F(maximum));
 LUMICUT_DESCRIPTOR(lumicut_render_desc, F(struct_size), F(width), F(height), F(samples), F(crop), F(tile_size),

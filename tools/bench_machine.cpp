@@ -116,26 +116,19 @@ ordered_json measure_yardstick(const io::Api& api, const std::string& scene, int
     ray = {from[0],   from[1], from[2], 1e-4f, to[0] - from[0], to[1] - from[1], to[2] - from[2], 0,
            1 - 1e-4f, ~0u,     0,       0};
   }
-  lumicut_device_desc device_desc{};
-  device_desc.struct_size = sizeof(device_desc);
-  device_desc.abi_major = LUMICUT_ABI_MAJOR;
-  device_desc.threads = threads;
-  io::Handle<lumicut_device> device(api);
-  io::check(api, api.device_create(&device_desc, device.out()), "device");
-  lumicut_accel_desc desc{};
-  desc.struct_size = sizeof(desc);
+  const api::Device device(api, threads);
+  auto desc = api::make<lumicut_accel_desc>();
   desc.kind = "embree";
   desc.positions = triangles.positions.data(), desc.position_count = triangles.positions.size() / 3;
   desc.indices = triangles.indices.data(), desc.triangle_count = triangles.indices.size() / 3;
-  io::Handle<lumicut_accel> built(api);
-  io::check(api, api.accel_build(device.get(), &desc, built.out()), "yardstick");
+  const api::Accel built(device, desc);
   double best = 1e30;
   size_t blocked = 0;
   for (int i = 0; i < 5; ++i) {
     stop_if_interrupted();
     std::vector<lumicut_ray> work = rays;
     const auto start = std::chrono::steady_clock::now();
-    io::check(api, api.accel_occluded(built.get(), work.data(), work.size()), "yardstick");
+    built.occluded(work);
     best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     blocked = static_cast<size_t>(std::count_if(work.begin(), work.end(), [](const auto& r) { return r.tfar < 0; }));
   }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -10,6 +11,7 @@
 #include "io/file_error.h"
 #include "io/json_reader.h"
 #include "tools/bench_references.h"
+#include "tools/render_setup.h"
 
 namespace lumicut::tools {
 
@@ -28,17 +30,7 @@ class PlanReader {
  public:
   PlanReader(const std::string& folder, const io::Api& api) : api_(api) {
     plan_.variables = io::PathVariables(folder);
-    lumicut_device_desc desc{};
-    desc.struct_size = sizeof(desc);
-    desc.abi_major = LUMICUT_ABI_MAJOR;
-    desc.threads = 1;
-    io::check(api_, api_.device_create(&desc, device_.out()), "device");
-    for (uint32_t i = 0;; ++i) {
-      lumicut_integrator_info info{};
-      info.struct_size = sizeof(info);
-      if (api_.get_integrator_info(i, &info) != LUMICUT_OK) break;
-      integrators_.push_back(info.id);
-    }
+    for (const auto& info : api::integrators(api_)) integrators_.push_back(info.id);
   }
 
   BenchPlan read(const JsonValue& root) {
@@ -71,7 +63,7 @@ class PlanReader {
       known_run(*baseline, plan_.baseline);
     } else {
       for (auto r = plan_.runs.rbegin(); r != plan_.runs.rend(); ++r)
-        if (r->integrator == "lightcuts") plan_.baseline = r->name;
+        if (r->integrator == kUsualIntegrator) plan_.baseline = r->name;
     }
     top.finish();
     return std::move(plan_);
@@ -229,12 +221,8 @@ class PlanReader {
 
   // Parameters of virtual lights and clamping, that every integrator has.
   bool is_common(const std::string& name) const {
-    for (uint32_t i = 0;; ++i) {
-      lumicut_param_info info{};
-      info.struct_size = sizeof(info);
-      if (api_.get_param_info("exhaustive", i, &info) != LUMICUT_OK) return false;
-      if (name == info.id) return true;
-    }
+    const auto common = api::params("exhaustive", api_);
+    return std::any_of(common.begin(), common.end(), [&](const auto& info) { return name == info.id; });
   }
 
   BenchMatch read_match(const JsonValue& value, const BenchRun& run) {
@@ -255,11 +243,9 @@ class PlanReader {
     lumicut_param_info info{};
     bool found = false;
     std::vector<std::string> names;
-    for (uint32_t i = 0; !found; ++i) {
-      info = {}, info.struct_size = sizeof(info);
-      if (api_.get_param_info(run.integrator.c_str(), i, &info) != LUMICUT_OK) break;
-      found = m.vary == info.id;
-      names.push_back(info.id);
+    for (const auto& known : api::params(run.integrator, api_)) {
+      names.emplace_back(known.id);
+      if (m.vary == known.id) info = known, found = true;
     }
     if (!found || info.type > LUMICUT_INT || is_common(m.vary)) {
       const std::string near = io::nearest_word(m.vary, names);
@@ -288,7 +274,7 @@ class PlanReader {
   }
 
   const io::Api& api_;
-  io::Handle<lumicut_device> device_{api_};
+  api::Device device_{api_, 1};
   std::vector<std::string> integrators_;
   BenchScene usual_;
   BenchPlan plan_;

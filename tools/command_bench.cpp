@@ -537,6 +537,10 @@ class BenchCommand {
     return best;
   }
 
+  bool sums_all_lights(const std::string& integrator) {
+    return (integrator_info(api(), integrator).traits & LUMICUT_ALL_LIGHTS) != 0;
+  }
+
   // Speed-ups: on the exhaustive sum and on the baseline, of the same group.
   void relate(size_t first, const BenchReference& reference) {
     const ordered_json *baseline = nullptr, *exhaustive = nullptr;
@@ -544,7 +548,7 @@ class BenchCommand {
     for (size_t i = first; i < rows.size(); ++i) {
       if (!rows[i].contains("seconds_each")) continue;
       if (rows[i]["run"] == plan_.baseline) baseline = &rows[i];
-      if (rows[i]["integrator"] == "exhaustive") exhaustive = &rows[i];
+      if (sums_all_lights(rows[i]["integrator"].get<std::string>())) exhaustive = &rows[i];
     }
     const auto timed = [&](const char* key) { return reference.info.contains(key) && reference.info[key].is_number(); };
     if (exhaustive == nullptr && timed("render_seconds") && timed("preprocess_seconds")) exhaustive = &reference.info;

@@ -21,7 +21,7 @@ using nlohmann::ordered_json;
 namespace {
 
 struct Options : RenderSetup {
-  Options() { integrator = "lightcuts"; }
+  Options() { integrator = kUsualIntegrator; }
   std::string scene, size;
   uint32_t samples = 0;
   bool json = false, no_forecast = false, quiet = false;

@@ -31,7 +31,7 @@ using nlohmann::ordered_json;
 namespace {
 
 struct Options : RenderSetup {
-  Options() { integrator = "lightcuts"; }
+  Options() { integrator = kUsualIntegrator; }
   std::string scene, size, folder;
   uint32_t sets = 16, paths = 1024;
   float ignore_above = std::numeric_limits<float>::infinity();
@@ -107,8 +107,10 @@ class ErrorsCommand {
     create_device(api(), o_, device_);
     create_scene(api(), o_, device_.get(), scene_);
     create_integrator(api(), o_, device_.get(), method_);  // a wrong parameter shall not wait for big files
-    if (o_.integrator == "path_tracer")
-      throw UsageError("errors: path_tracer is the truth that methods with virtual lights are measured against");
+    if (lacks(integrator_info(api(), o_.integrator), LUMICUT_VIRTUAL_LIGHTS))
+      throw UsageError(
+          fmt::format("errors: {} has no virtual lights; what is taken apart is the error of methods that have them",
+                      o_.integrator));
     bar_.show("reading files", 0, 0);
     const io::SceneData data = read_scene_file(o_.scene);
     bar_.wipe();
@@ -127,9 +129,7 @@ class ErrorsCommand {
   io::Handle<lumicut_integrator> like_method(const char* id) const {
     io::Handle<lumicut_integrator> other(api());
     io::check(api(), api().integrator_create(device_.get(), id, other.out()), id);
-    lumicut_param_info info{};
-    info.struct_size = sizeof(info);
-    for (uint32_t i = 0; api().get_param_info(id, i, &info) == LUMICUT_OK; ++i)
+    for (const auto& info : api::params(id, api()))
       if (const char* value = api().integrator_get(method_.get(), info.id)) set(other, info.id, value);
     return other;
   }

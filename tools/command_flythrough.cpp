@@ -151,9 +151,13 @@ class FlythroughCommand {
     create_device(api(), o_, device_);
     create_scene(api(), o_, device_.get(), scene_);
     create_integrator(api(), o_, device_.get(), integrator_);
-    state_ = static_cast<const lumicut_state_extension*>(api().get_extension(LUMICUT_STATE_EXTENSION));
+    state_ = api::extension<lumicut_state_extension>(LUMICUT_STATE_EXTENSION, api());
     if (state_ == nullptr && !(o_.save_state.empty() && o_.load_state.empty()))
       throw UsageError("--save-state, --load-state: this library has no extension " LUMICUT_STATE_EXTENSION);
+    const std::string& state = o_.save_state.empty() ? o_.load_state : o_.save_state;
+    if (!state.empty() && lacks(integrator_info(api(), o_.integrator), LUMICUT_SAVED_STATE))
+      throw UsageError(fmt::format("{} of {}: this integrator has no state to save",
+                                   o_.save_state.empty() ? "--load-state" : "--save-state", o_.integrator));
   }
 
   void set_host_lights() {

@@ -13,13 +13,10 @@ using nlohmann::ordered_json;
 
 namespace {
 
-ordered_json parameters(const io::Api& api, const char* integrator, uint32_t count) {
+ordered_json parameters(const io::Api& api, const char* integrator) {
   static const char* const kTypes[] = {"float", "int", "bool", "choice"};
   ordered_json list = ordered_json::array();
-  for (uint32_t i = 0; i < count; ++i) {
-    lumicut_param_info p{};
-    p.struct_size = sizeof(p);
-    io::check(api, api.get_param_info(integrator, i, &p), "parameter information");
+  for (const auto& p : api::params(integrator, api)) {
     ordered_json entry = {{"id", p.id}, {"type", p.type < 4 ? kTypes[p.type] : "?"}, {"default", p.default_text}};
     if (p.type <= LUMICUT_INT) entry["minimum"] = p.minimum, entry["maximum"] = p.maximum;
     if (p.type == LUMICUT_CHOICE) entry["choices"] = p.choices;
@@ -29,6 +26,28 @@ ordered_json parameters(const io::Api& api, const char* integrator, uint32_t cou
   return list;
 }
 
+ordered_json traits(const lumicut_integrator_info& info) {
+  static constexpr std::pair<uint32_t, const char*> kNames[] = {
+      {LUMICUT_VIRTUAL_LIGHTS, "virtual_lights"},     {LUMICUT_LIGHT_GROUPS, "light_groups"},
+      {LUMICUT_COMPENSATION, "compensation"},         {LUMICUT_SAVED_STATE, "saved_state"},
+      {LUMICUT_VIEW_INDEPENDENT, "view_independent"}, {LUMICUT_ALL_LIGHTS, "all_lights"}};
+  ordered_json names = ordered_json::array();
+  for (const auto& [flag, name] : kNames)
+    if ((info.traits & flag) != 0) names.push_back(name);
+  return names;
+}
+
+ordered_json presets(const lumicut_integrator_info& info) {
+  ordered_json all = ordered_json::object();
+  for (const auto& [name, text] : {std::pair{"interactive", info.interactive},
+                                   {"preview", info.preview},
+                                   {"draft", info.draft},
+                                   {"good", info.good},
+                                   {"reference", info.reference}})
+    if (text != nullptr && *text != 0) all[name] = text;
+  return all;
+}
+
 ordered_json describe(const io::Library& library) {
   const io::Api& api = library.api();
   uint32_t major = 0, minor = 0;
@@ -36,24 +55,18 @@ ordered_json describe(const io::Library& library) {
   all["abi"] = fmt::format("{}.{}", major, minor);
   all["library"] = library.path();
   all["integrators"] = ordered_json::array();
-  for (uint32_t i = 0;; ++i) {
-    lumicut_integrator_info info{};
-    info.struct_size = sizeof(info);
-    if (api.get_integrator_info(i, &info) != LUMICUT_OK) break;
+  for (const auto& info : api::integrators(api))
     all["integrators"].push_back({{"id", info.id},
                                   {"label", info.label},
                                   {"description", info.description},
                                   {"source", info.source},
-                                  {"parameters", parameters(api, info.id, info.param_count)}});
-  }
+                                  {"traits", traits(info)},
+                                  {"presets", presets(info)},
+                                  {"parameters", parameters(api, info.id)}});
   all["channels"] = ordered_json::array();
-  for (uint32_t i = 0;; ++i) {
-    lumicut_channel_info info{};
-    info.struct_size = sizeof(info);
-    if (api.get_channel_info(i, &info) != LUMICUT_OK) break;
+  for (const auto& info : api::channels(api))
     all["channels"].push_back(
         {{"name", info.name}, {"components", info.components}, {"description", info.description}});
-  }
   return all;
 }
 
@@ -63,6 +76,8 @@ void print_text(const ordered_json& all) {
   fmt::print("lumicut {}, ABI {}, {}\n", text(all["version"]), text(all["abi"]), text(all["library"]));
   for (const auto& integrator : all["integrators"]) {
     fmt::print("\n{}: {}\n  {}\n", text(integrator["id"]), text(integrator["description"]), text(integrator["source"]));
+    for (const auto& [name, parameters] : integrator["presets"].items())
+      fmt::print("  {}: {}\n", name, text(parameters));
     for (const auto& p : integrator["parameters"]) {
       std::string range = text(p["type"]);
       if (p.contains("minimum"))

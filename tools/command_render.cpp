@@ -33,7 +33,7 @@ using nlohmann::ordered_json;
 namespace {
 
 struct Options : RenderSetup {
-  Options() { integrator = "lightcuts"; }
+  Options() { integrator = kUsualIntegrator; }
   std::string scene, output, png, stats, vpl_in, vpl_out, size, crop, layers, heat_maps, checkpoint;
   uint32_t samples = 0, squares = 0, passes = 0;
   double seconds = 0, target_error = 0, confidence = 0;
@@ -53,10 +53,7 @@ struct Channel {
 std::vector<Channel> choose_channels(const io::Api& api, const std::string& asked) {
   std::vector<Channel> known;
   std::string names;
-  for (uint32_t i = 0;; ++i) {
-    lumicut_channel_info info{};
-    info.struct_size = sizeof(info);
-    if (api.get_channel_info(i, &info) != LUMICUT_OK) break;
+  for (const auto& info : api::channels(api)) {
     known.push_back({info.name, static_cast<int>(info.components)});
     names += (names.empty() ? "" : ", ") + known.back().name;
   }
@@ -161,6 +158,8 @@ class RenderCommand {
 
   void create_integrator() {
     create_integrator(integrator_);
+    if (o_.groups && lacks(integrator_info(api(), o_.integrator), LUMICUT_LIGHT_GROUPS))
+      throw UsageError(fmt::format("--groups: {} cannot tell light groups apart", o_.integrator));
     if (o_.vpl_in.empty()) return;
     const NothingToLose reading;
     lights_ = io::read_vpls(o_.vpl_in);
@@ -475,10 +474,7 @@ class RenderCommand {
     stats["robust"] = o_.rays == "robust";
     stats["threads"] = o_.threads;
     ordered_json parameters = ordered_json::object();
-    for (uint32_t i = 0;; ++i) {
-      lumicut_param_info info{};
-      info.struct_size = sizeof(info);
-      if (api().get_param_info(o_.integrator.c_str(), i, &info) != LUMICUT_OK) break;
+    for (const auto& info : api::params(o_.integrator, api())) {
       const char* value = api().integrator_get(integrator_.get(), info.id);
       parameters[info.id] = value ? value : "";
     }

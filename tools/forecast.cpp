@@ -80,12 +80,7 @@ Forecast forecast(const io::Api& api, const RenderSetup& setup, lumicut_scene sc
   f.seconds = f.prepare_seconds + render_cpu / threads;
   f.rays_per_pixel = rays / f.probed_pixels;
   double components = 0;
-  for (uint32_t i = 0;; ++i) {
-    lumicut_channel_info info{};
-    info.struct_size = sizeof(info);
-    if (api.get_channel_info(i, &info) != LUMICUT_OK) break;
-    components += info.components;
-  }
+  for (const auto& channel : api::channels(api)) components += channel.components;
   // The film, the copies of it that are written, and those that the file formats make.
   f.peak_bytes = std::max(0.0, peak_now() - held_bytes) + 3 * sizeof(float) * components * f.pixels;
   return f;

@@ -41,11 +41,7 @@ void tell_warnings(const io::Warnings& warnings, const std::string& file, bool s
 }
 
 void create_device(const io::Api& api, const RenderSetup& setup, io::Handle<lumicut_device>& device) {
-  lumicut_device_desc desc{};
-  desc.struct_size = sizeof(desc);
-  desc.abi_major = LUMICUT_ABI_MAJOR;
-  desc.threads = setup.threads;
-  io::check(api, api.device_create(&desc, device.out()), "device");
+  device = api::Device(api, setup.threads);
 }
 
 void commit_scene(const io::Api& api, InterruptWatcher& watcher, lumicut_scene scene, const std::string& file) {
@@ -82,6 +78,12 @@ void create_integrator(const io::Api& api, const RenderSetup& setup, lumicut_dev
       throw UsageError(fmt::format("-p {}: must be name=value", parameter));
     set(parameter.substr(0, equals), parameter.substr(equals + 1));
   }
+}
+
+lumicut_integrator_info integrator_info(const io::Api& api, const std::string& id) {
+  for (const auto& info : api::integrators(api))
+    if (id == info.id) return info;
+  throw UsageError(fmt::format("the library has no integrator \"{}\"", id));
 }
 
 CLI::Validator number_in(double low, double high) {

@@ -19,6 +19,8 @@ namespace lumicut::tools {
 
 class InterruptWatcher;
 
+inline constexpr const char* kUsualIntegrator = "lightcuts";
+
 struct RenderSetup {
   std::string integrator, accel = "bvh", builder, rays = "robust";
   std::vector<std::string> parameters;  // name=value
@@ -46,6 +48,13 @@ void create_scene(const io::Api& api, const RenderSetup& setup, lumicut_device d
                   io::Handle<lumicut_scene>& scene);
 void create_integrator(const io::Api& api, const RenderSetup& setup, lumicut_device device,
                        io::Handle<lumicut_integrator>& integrator);
+
+// What the library tells of an integrator. Throws UsageError where there is none of that name.
+lumicut_integrator_info integrator_info(const io::Api& api, const std::string& id);
+// Whether it is known to lack a trait, such as LUMICUT_SAVED_STATE: libraries before ABI 1.4 do not tell.
+inline bool lacks(const lumicut_integrator_info& info, uint32_t trait) {
+  return info.traits != 0 && (info.traits & trait) == 0;
+}
 
 // For options of numbers: from `low` to `high`, and no NaN (which CLI::Range lets pass).
 CLI::Validator number_in(double low, double high);

@@ -237,7 +237,7 @@ class Collector:
         if self.scene.environment is not None:
             self.scene.environment.group = self._group(scene.world)
         if self.scene.environment is not None and scene.render.film_transparent:
-            self.scene.environment.flags |= library.ENVIRONMENT_HIDDEN
+            self.scene.environment.flags |= library.HIDDEN
         if scene.render.use_motion_blur:
             self.report.note(scene.name, "Motion blur left out")
         if scene.render.use_freestyle:

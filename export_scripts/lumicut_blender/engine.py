@@ -15,7 +15,6 @@ POLL_MS = 40
 SHOW_SECONDS = 0.25  # between two changes of what is shown: each redraws the window, and a window that draws hears no key
 FLAT_RECTS = bpy.app.version >= (4, 1, 0)
 NO_DEPTH = 1e10  # as Cycles has it where nothing is hit
-WITHOUT_GROUPS = {"path_tracer"}  # the library tells groups apart by their virtual lights
 export_requests = []  # folders that the next render writes a scene to, in place of rendering
 
 
@@ -168,17 +167,15 @@ class LumicutEngine(bpy.types.RenderEngine):
 
     @staticmethod
     def _preview_settings():
-        names = [row[0] for row in properties.tables.integrators]
-        if "stochastic_lightcuts" in names:
-            return "stochastic_lightcuts", 1, {"vpls": "2000", "lights": "32"}
-        return names[0], 1, {"vpls": "300"}
+        integrator, parameters = properties.tables.suggested("preview")
+        return integrator, 1, parameters or {"vpls": "300"}
 
     def _render_options(self, depsgraph, settings, groups, report):
         """What lumicut_render_desc has beside size, samples and tiles."""
         if self.is_preview:
             return {}
-        if groups and settings.integrator in WITHOUT_GROUPS:
-            report.note(settings.integrator, "Light groups left out by integrators without virtual lights")
+        if groups and not properties.tables.has(settings.integrator, library.LIGHT_GROUPS):
+            report.note(settings.integrator, "Light groups left out by integrators that cannot tell them apart")
             groups = []
         options = {name: getattr(settings, name) for name in properties.STOPS}
         layer = depsgraph.view_layer_eval

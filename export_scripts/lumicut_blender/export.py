@@ -251,7 +251,7 @@ class Writer:
         out = {"color": numbers(e.color)}
         if e.texture:
             out |= {"image": self.image(e.texture, "radiance"), "world_to_map": numbers(e.world_to_map)}
-        if e.flags & library.ENVIRONMENT_HIDDEN:
+        if e.flags & library.HIDDEN:
             out["hidden"] = True
         if e.group:
             out["group"] = e.group

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The library from Python: every ctypes declaration of the add-on, and handles that release themselves.
+"""The library from Python: lumicut.h in ctypes, whole, and handles that release themselves.
 
-Mirrors plugin/include/lumicut/lumicut.h, ABI 1. Knows nothing of Blender, so that it runs in any Python with numpy.
+A test compares every structure, function and constant with plugin/include/lumicut/lumicut.h. Knows nothing of Blender, so that it runs in any Python with numpy.
 All functions have their signatures (a missing one truncates pointers); ctypes releases the GIL while a call works.
 """
 import ctypes
@@ -10,11 +10,12 @@ import json
 import os
 import pathlib
 import sys
+import typing
 from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int32, c_uint32, c_uint64, c_void_p
 
 import numpy as np
 
-ABI_MAJOR, ABI_MINOR = 1, 3
+ABI_MAJOR, ABI_MINOR = 1, 4
 OK, INVALID_ARGUMENT, INVALID_STATE, UNSUPPORTED, OUT_OF_MEMORY, CANCELLED, INTERNAL = range(7)
 IDLE, RUNNING, DONE, STOPPED, FAILED = range(5)
 FLOAT, INT, BOOL, CHOICE = range(4)
@@ -24,9 +25,11 @@ SRGB, CLAMP, NEAREST = 1, 2, 4
 EMIT_BOTH_SIDES, PHONG, GGX, NO_FRESNEL = 1, 2, 4, 8
 POINT, SPOT, RECTANGLE, DISK, SUN = range(5)
 RADIOMETRIC, WATT = 0, 1
-ENVIRONMENT_HIDDEN = 1
+HIDDEN = 1  # of Environment.flags
 CHECKPOINTS, ILLUMINANCE, GROUPS = 1, 2, 4  # of RenderDesc.flags
-FOREVER = 0xFFFFFFFF
+VIRTUAL_LIGHTS, LIGHT_GROUPS, COMPENSATION, SAVED_STATE, VIEW_INDEPENDENT, ALL_LIGHTS = 1, 2, 4, 8, 16, 32  # traits
+VPL_OMNI, VPL_ORIENTED, VPL_DIRECTIONAL, VPL_SPOT, VPL_SPHERE = range(5)
+FOREVER = NO_ID = 0xFFFFFFFF
 
 
 class Error(RuntimeError):
@@ -56,6 +59,36 @@ class Descriptor(Structure):
 LOG_FUNCTION = ctypes.CFUNCTYPE(None, c_void_p, c_int32, c_char_p)
 
 
+class Ray(Structure):
+    _fields_ = [("org_x", c_float), ("org_y", c_float), ("org_z", c_float), ("tnear", c_float), ("dir_x", c_float),
+                ("dir_y", c_float), ("dir_z", c_float), ("time", c_float), ("tfar", c_float), ("mask", c_uint32),
+                ("id", c_uint32), ("flags", c_uint32)]
+
+
+class Hit(Structure):
+    _fields_ = [("ng_x", c_float), ("ng_y", c_float), ("ng_z", c_float), ("u", c_float), ("v", c_float),
+                ("prim_id", c_uint32), ("geom_id", c_uint32), ("inst_id", c_uint32)]
+
+
+class Rayhit(Structure):
+    _fields_ = [("ray", Ray), ("hit", Hit)]
+
+
+class Vpl(Structure):
+    _fields_ = [("position", c_float * 3), ("kind", c_uint32), ("normal", c_float * 3), ("group", c_uint32),
+                ("intensity", c_float * 3), ("cos_outer", c_float), ("blend", c_float), ("spot_cosine", c_float),
+                ("spread_tan", c_float), ("profile", c_uint32)]
+
+
+class Point(Structure):
+    _fields_ = [("position", c_float * 3), ("material", c_uint32), ("normal", c_float * 3), ("u", c_float),
+                ("geometric_normal", c_float * 3), ("v", c_float), ("to_viewer", c_float * 3), ("pixel", c_uint32)]
+
+
+INTERSECT_FUNCTION = ctypes.CFUNCTYPE(None, c_void_p, POINTER(Rayhit), c_uint64)
+OCCLUDED_FUNCTION = ctypes.CFUNCTYPE(None, c_void_p, POINTER(Ray), c_uint64)
+
+
 class DeviceDesc(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("abi_major", c_uint32), ("threads", c_int32), ("verbosity", c_int32),
                 ("log", LOG_FUNCTION), ("user", c_void_p)]
@@ -65,6 +98,29 @@ class Status(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("state", c_int32), ("phase", c_char_p), ("fraction", c_double),
                 ("seconds", c_double), ("tiles_done", c_uint64), ("tiles_total", c_uint64), ("passes_done", c_uint32),
                 ("passes_total", c_uint32), ("error", c_double)]
+
+
+class AccelDesc(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("robust", c_uint32), ("kind", c_char_p), ("builder", c_char_p),
+                ("positions", c_void_p), ("position_count", c_uint64), ("position_stride", c_uint64),
+                ("indices", c_void_p), ("triangle_count", c_uint64), ("boxes", c_void_p), ("box_count", c_uint64)]
+
+
+class AccelInfo(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("node_count", c_uint32), ("primitive_count", c_uint64),
+                ("bytes", c_uint64), ("build_seconds", c_double), ("expected_boxes", c_double),
+                ("expected_primitives", c_double), ("expected_cost", c_double), ("lower", c_float * 3),
+                ("upper", c_float * 3)]
+
+
+class AccelNodeInfo(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("left", c_uint32), ("right", c_uint32), ("first", c_uint32),
+                ("count", c_uint32), ("lower", c_float * 3), ("upper", c_float * 3)]
+
+
+class Trace(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("batch", c_uint32), ("intersect", INTERSECT_FUNCTION),
+                ("occluded", OCCLUDED_FUNCTION), ("user", c_void_p)]
 
 
 class SceneDesc(Descriptor):
@@ -121,7 +177,9 @@ class Camera(Descriptor):
 
 class IntegratorInfo(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("param_count", c_uint32), ("id", c_char_p), ("label", c_char_p),
-                ("description", c_char_p), ("source", c_char_p)]
+                ("description", c_char_p), ("source", c_char_p), ("traits", c_uint32), ("reserved", c_uint32),
+                ("interactive", c_char_p), ("preview", c_char_p), ("draft", c_char_p), ("good", c_char_p),
+                ("reference", c_char_p)]
 
 
 class ParamInfo(Descriptor):
@@ -146,8 +204,9 @@ class ChannelInfo(Descriptor):
 
 
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
-SIZES = {DeviceDesc: 32, Status: 64, SceneDesc: 24, Texture: 32, Material: 124, Mesh: 88, Light: 116, Profile: 40,
-         Environment: 64, Camera: 92, IntegratorInfo: 40, ParamInfo: 72, RenderDesc: 72, Tile: 20, ChannelInfo: 24}
+SIZES = {Ray: 48, Hit: 32, Rayhit: 80, Vpl: 64, Point: 64, DeviceDesc: 32, Status: 64, AccelDesc: 80, AccelInfo: 80,
+         AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 32, Material: 124, Mesh: 88, Light: 116, Profile: 40,
+         Environment: 64, Camera: 92, IntegratorInfo: 88, ParamInfo: 72, RenderDesc: 72, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32
 HANDLE = c_void_p
@@ -155,30 +214,45 @@ FUNCTIONS = {
     "version": (c_char_p, [POINTER(c_uint32), POINTER(c_uint32)]),
     "last_error": (c_char_p, []),
     "device_create": (RESULT, [POINTER(DeviceDesc), POINTER(HANDLE)]),
+    "retain": (None, [HANDLE]),
     "release": (None, [HANDLE]),
-    "get_status": (RESULT, [HANDLE, POINTER(Status)]),
-    "cancel": (RESULT, [HANDLE]),
-    "stats_json": (c_char_p, [HANDLE]),
     "scene_create": (RESULT, [HANDLE, POINTER(SceneDesc), POINTER(HANDLE)]),
-    "scene_set_textures": (RESULT, [HANDLE, POINTER(Texture), c_uint64]),
     "scene_set_materials": (RESULT, [HANDLE, POINTER(Material), c_uint64]),
     "scene_add_mesh": (RESULT, [HANDLE, POINTER(Mesh), POINTER(c_uint32)]),
     "scene_set_lights": (RESULT, [HANDLE, POINTER(Light), c_uint64]),
-    "scene_set_profiles": (RESULT, [HANDLE, POINTER(Profile), c_uint64]),
-    "scene_set_environment": (RESULT, [HANDLE, POINTER(Environment)]),
     "scene_set_camera": (RESULT, [HANDLE, POINTER(Camera)]),
     "scene_commit": (RESULT, [HANDLE]),
-    "get_integrator_info": (RESULT, [c_uint32, POINTER(IntegratorInfo)]),
-    "get_param_info": (RESULT, [c_char_p, c_uint32, POINTER(ParamInfo)]),
     "integrator_create": (RESULT, [HANDLE, c_char_p, POINTER(HANDLE)]),
     "integrator_set": (RESULT, [HANDLE, c_char_p, c_char_p]),
-    "integrator_prepare": (RESULT, [HANDLE, HANDLE]),
-    "get_channel_info": (RESULT, [c_uint32, POINTER(ChannelInfo)]),
+    "integrator_get": (c_char_p, [HANDLE, c_char_p]),
     "render_start": (RESULT, [HANDLE, HANDLE, POINTER(RenderDesc), POINTER(HANDLE)]),
     "render_wait": (RESULT, [HANDLE, c_uint32, POINTER(Status)]),
-    "render_next_tile": (RESULT, [HANDLE, POINTER(Tile)]),
     "render_read": (RESULT, [HANDLE, c_char_p, POINTER(Tile), c_void_p]),
+    "render_next_tile": (RESULT, [HANDLE, POINTER(Tile)]),
     "render_groups": (RESULT, [HANDLE, POINTER(POINTER(c_uint32)), POINTER(c_uint64)]),
+    "render_checkpoint": (RESULT, [HANDLE, POINTER(c_void_p), POINTER(c_uint64)]),
+    "get_status": (RESULT, [HANDLE, POINTER(Status)]),
+    "cancel": (RESULT, [HANDLE]),
+    "stats_json": (c_char_p, [HANDLE]),
+    "scene_set_textures": (RESULT, [HANDLE, POINTER(Texture), c_uint64]),
+    "scene_set_profiles": (RESULT, [HANDLE, POINTER(Profile), c_uint64]),
+    "scene_set_environment": (RESULT, [HANDLE, POINTER(Environment)]),
+    "scene_update_mesh": (RESULT, [HANDLE, c_uint32, c_void_p, c_void_p, c_void_p]),
+    "get_integrator_info": (RESULT, [c_uint32, POINTER(IntegratorInfo)]),
+    "get_param_info": (RESULT, [c_char_p, c_uint32, POINTER(ParamInfo)]),
+    "get_channel_info": (RESULT, [c_uint32, POINTER(ChannelInfo)]),
+    "get_extension": (c_void_p, [c_char_p]),
+    "integrator_set_lights": (RESULT, [HANDLE, POINTER(Vpl), c_uint64]),
+    "integrator_prepare": (RESULT, [HANDLE, HANDLE]),
+    "integrator_get_lights": (RESULT, [HANDLE, POINTER(POINTER(Vpl)), POINTER(c_uint64)]),
+    "integrator_shade": (RESULT, [HANDLE, POINTER(Point), c_uint64, c_void_p]),
+    "scene_set_trace": (RESULT, [HANDLE, POINTER(Trace)]),
+    "accel_build": (RESULT, [HANDLE, POINTER(AccelDesc), POINTER(HANDLE)]),
+    "accel_get_info": (RESULT, [HANDLE, POINTER(AccelInfo)]),
+    "accel_get_node": (RESULT, [HANDLE, c_uint32, POINTER(AccelNodeInfo)]),
+    "accel_get_primitives": (RESULT, [HANDLE, POINTER(POINTER(c_uint32)), POINTER(c_uint64)]),
+    "accel_intersect": (RESULT, [HANDLE, POINTER(Rayhit), c_uint64]),
+    "accel_occluded": (RESULT, [HANDLE, POINTER(Ray), c_uint64]),
 }
 
 
@@ -224,6 +298,21 @@ def load_file(path):
     return dll, version, (major.value, minor.value)
 
 
+QUALITIES = ("interactive", "preview", "draft", "good", "reference")  # fields of IntegratorInfo
+ANY_TRAIT = VIRTUAL_LIGHTS | LIGHT_GROUPS | COMPENSATION  # of libraries before ABI 1.4, which do not tell
+
+
+class IntegratorRow(typing.NamedTuple):
+    """All texts str. `traits`: VIRTUAL_LIGHTS ...; `presets`: {quality: {parameter: text}}, empty without a suggestion."""
+    id: str
+    label: str
+    description: str
+    source: str
+    parameters: list
+    traits: int
+    presets: dict
+
+
 class Library:
     """The loaded library and its tables. Raises Error where a call fails, Cancelled where it was cancelled."""
 
@@ -247,7 +336,7 @@ class Library:
         raise (Cancelled if code == CANCELLED else Error)(code, text or f"error {code}")
 
     def integrators(self):
-        """[(id, label, description, source, [parameters])], as the library declares them; all texts str."""
+        """[IntegratorRow] as the library declares them."""
         result = []
         while True:
             info = IntegratorInfo()
@@ -260,8 +349,10 @@ class Library:
                 parameters.append({name: getattr(p, name).decode() for name in
                                    ("id", "label", "description", "unit", "choices", "default_text")} |
                                   {"type": p.type, "minimum": p.minimum, "maximum": p.maximum})
-            result.append((info.id.decode(), info.label.decode(), info.description.decode(), info.source.decode(),
-                           parameters))
+            presets = {name: dict(pair.split("=", 1) for pair in (getattr(info, name) or b"").decode().split())
+                       for name in QUALITIES}
+            result.append(IntegratorRow(info.id.decode(), info.label.decode(), info.description.decode(),
+                                        info.source.decode(), parameters, info.traits or ANY_TRAIT, presets))
 
     def channels(self):
         """{name: components}"""

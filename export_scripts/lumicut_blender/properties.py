@@ -27,14 +27,15 @@ GROUP_PASS = "Combined_"  # of a light group, as Cycles names it
 
 STOPS = ("passes", "max_seconds", "target_error", "confidence")  # of lumicut_render_desc, under the same names
 
+DEFAULT_INTEGRATOR = "illumination_cut"
 PRESETS = {
-    # name: (label, tooltip, own settings, integrator, parameters of whatever group has them)
+    # name, a quality of the library's: (label, tooltip, own settings, integrator, which the library suggests parameters for)
     "draft": ("Draft", "A first look: one sample, few lights, wide bounds",
-              {"samples": 1}, "illumination_cut", {"vpls": 10000, "error": 0.05}),
+              {"samples": 1}, DEFAULT_INTEGRATOR),
     "good": ("Good", "For most images: antialiased, 60,000 lights, bounds of 2 %",
-             {"samples": 9}, "illumination_cut", {"vpls": 60000, "error": 0.02}),
+             {"samples": 9}, DEFAULT_INTEGRATOR),
     "reference": ("Reference", "256 passes that each sum all of 4,000 lights anew, with what the clamp takes brought back: slow, and as path traced: corners, gloss and glass too",
-                  {"samples": 1, "passes": 256}, "exhaustive", {"vpls": 4000, "compensate": True}),
+                  {"samples": 1, "passes": 256}, "exhaustive"),
 }
 
 
@@ -71,17 +72,39 @@ def text_of(value):
     return f"{value:.7g}" if isinstance(value, float) else str(value)
 
 
+def value_of(parameter, text):
+    """The other way round, for a property of property_of."""
+    kind = parameter["type"]
+    if kind == library.BOOL:
+        return text in {"1", "true"}
+    return text if kind == library.CHOICE else int(text) if kind == library.INT else float(text)
+
+
 class Tables:
     """The parameter tables, parted into what nearly all integrators share and what each has alone."""
 
     def __init__(self, integrators):
         self.integrators = integrators
-        self.of = {identifier: parameters for identifier, *_, parameters in integrators}
+        self.of = {row.id: row.parameters for row in integrators}
         self.ids = {identifier: {p["id"] for p in parameters} for identifier, parameters in self.of.items()}
-        first = integrators[0][4] if integrators else []
+        first = integrators[0].parameters if integrators else []
         # Shared by more than half: a path tracer has no virtual lights, so their parameters are not its own.
         self.common = [p for p in first if 2 * sum(p["id"] in ids for ids in self.ids.values()) > len(self.ids)]
         self.common_ids = {p["id"] for p in self.common}
+
+    def row(self, integrator):
+        return next(row for row in self.integrators if row.id == integrator)
+
+    def has(self, integrator, trait):
+        """Whether it has a trait, such as library.LIGHT_GROUPS."""
+        return bool(self.row(integrator).traits & trait)
+
+    def suggested(self, quality, wanted=None):
+        """(integrator, its parameters) for a quality: the wanted one, or the first that the library suggests something for,
+        or the first."""
+        rows = [row for row in self.integrators if row.presets[quality]] or self.integrators
+        row = next((row for row in rows if row.id == wanted), rows[0])
+        return row.id, row.presets[quality]
 
     def groups(self):
         """[(group, [parameters])]; the common ones first."""
@@ -115,20 +138,19 @@ def common_parameters_of(settings, integrator):
 
 
 def apply_preset(settings, name):
-    _, _, own, integrator, values = PRESETS[name]
+    _, _, own, wanted = PRESETS[name]
     for key in STOPS:
         settings.property_unset(key)
     for key, value in own.items():
         setattr(settings, key, value)
-    known = [row[0] for row in tables.integrators]
-    settings.integrator = integrator if integrator in known else known[0]
+    settings.integrator, values = tables.suggested(name, wanted)
     for group, parameters in tables.groups():
         if group not in {COMMON, settings.integrator}:
             continue
         for p in parameters:
             target = getattr(settings, group)
             if p["id"] in values:
-                setattr(target, p["id"], values[p["id"]])
+                setattr(target, p["id"], value_of(p, values[p["id"]]))
             elif p["id"] != "seed":
                 target.property_unset(p["id"])
 
@@ -159,11 +181,11 @@ def register():
         "threads": IntProperty(name="Threads", description="0: all", default=0, min=0, max=1024),
     }
     if tables.integrators:
-        identifiers = [row[0] for row in tables.integrators]
+        identifiers = [row.id for row in tables.integrators]
         annotations["integrator"] = EnumProperty(
             name="Integrator", description="How the virtual lights are summed",
-            items=[(i, label, f"{text}. {source}") for i, label, text, source, _ in tables.integrators],
-            default="illumination_cut" if "illumination_cut" in identifiers else identifiers[0])
+            items=[(row.id, row.label, f"{row.description}. {row.source}") for row in tables.integrators],
+            default=DEFAULT_INTEGRATOR if DEFAULT_INTEGRATOR in identifiers else identifiers[0])
     for group, parameters in tables.groups():
         cls = type(f"LumicutParameters_{group}", (bpy.types.PropertyGroup,),
                    {"__annotations__": {p["id"]: property_of(p) for p in parameters}})

@@ -17,12 +17,8 @@ from . import collect, library, properties, runtime, sky
 from .nodes import Images
 from .report import Report
 
-# (pixels of the view a pixel of the picture, integrator or None for the scene's own, its parameters)
-LEVELS = (
-    (8, "stochastic_lightcuts", {"lights": "16"}),
-    (3, "stochastic_lightcuts", {"lights": "32"}),
-    (1, None, {}),
-)
+# (pixels of the view a pixel of the picture, quality that the library suggests an integrator for or None for the scene's own)
+LEVELS = ((8, "interactive"), (3, "preview"), (1, None))
 _sessions = weakref.WeakSet()
 TICK = 0.05
 
@@ -73,14 +69,16 @@ class Session:
     @staticmethod
     def _settings(settings):
         chosen = settings.integrator
-        names = {chosen} | {name for _, name, _ in LEVELS if name in properties.tables.ids}
-        parameters = {name: (properties.parameters_of if name == chosen else properties.common_parameters_of)(settings, name)
-                      for name in names}
-        for values in parameters.values():
+        levels = []
+        for divisor, quality in LEVELS:
+            name, suggested = properties.tables.suggested(quality) if quality else (chosen, {})
+            if not suggested:
+                name = chosen
+            values = (properties.parameters_of if name == chosen else properties.common_parameters_of)(settings, name) | suggested
             if "vpls" in values:
                 values["vpls"] = str(settings.viewport_lights)
-        return {"integrator": chosen, "parameters": parameters, "tracing": properties.tracing_of(settings),
-                "threads": settings.threads}
+            levels.append((divisor, name, values))
+        return {"levels": levels, "tracing": properties.tracing_of(settings), "threads": settings.threads}
 
     def draw(self, engine, context, depsgraph):
         region = context.region
@@ -195,13 +193,11 @@ class Session:
             raise library.Cancelled(library.CANCELLED, "a newer view waits")
 
     def _render_levels(self, device, scene, integrators, size, settings):
-        for number, (divisor, name, extra) in enumerate(LEVELS):
-            if name not in settings["parameters"]:
-                name, extra = settings["integrator"], {}
-            key = (name, number if extra else None)
+        for number, (divisor, name, values) in enumerate(settings["levels"]):
+            key = (name, tuple(sorted(values.items())))
             if key not in integrators:
                 integrator = library.Integrator(device, name)
-                for parameter, value in (settings["parameters"][name] | extra).items():
+                for parameter, value in values.items():
                     integrator.set(parameter, value)
                 integrators[key] = integrator
             width, height = max(1, size[0] // divisor), max(1, size[1] // divisor)
@@ -220,7 +216,7 @@ class Session:
 
 
 def scene_is_transparent(data):
-    return data is not None and data.environment is not None and bool(data.environment.flags & library.ENVIRONMENT_HIDDEN)
+    return data is not None and data.environment is not None and bool(data.environment.flags & library.HIDDEN)
 
 
 def _tick():

@@ -65,7 +65,8 @@ class Tables(unittest.TestCase):
         settings = bpy.context.scene.lumicut
         rows = runtime.require().integrators()
         self.assertGreater(len(rows), 4)
-        for identifier, _, _, _, parameters in rows:
+        for row in rows:
+            identifier, parameters = row.id, row.parameters
             text = properties.parameters_of(settings, identifier)
             self.assertEqual(set(text), {p["id"] for p in parameters})
             for p in parameters:
@@ -78,8 +79,8 @@ class Tables(unittest.TestCase):
 
     def test_tooltips_and_ranges_are_the_librarys(self):
         settings = bpy.context.scene.lumicut
-        row = next(r for r in runtime.require().integrators() if r[0] == "lightcuts")
-        error = next(p for p in row[4] if p["id"] == "error")
+        row = next(r for r in runtime.require().integrators() if r.id == "lightcuts")
+        error = next(p for p in row.parameters if p["id"] == "error")
         prop = settings.lightcuts.bl_rna.properties["error"]
         self.assertIn(error["description"], prop.description)
         self.assertEqual((prop.hard_min, prop.hard_max), (error["minimum"], error["maximum"]))
@@ -87,7 +88,7 @@ class Tables(unittest.TestCase):
     def test_every_integrator_renders_what_it_is_set_to(self):
         h.add_plane(material=h.diffuse())
         h.add_light("POINT")
-        for identifier, *_ in runtime.require().integrators():
+        for identifier in (row.id for row in runtime.require().integrators()):
             with self.subTest(integrator=identifier), h.quiet():
                 h.set_lumicut(identifier, vpls=200)
                 self.assertGreater(h.radiance(h.render()).mean(), 0.01)
@@ -95,24 +96,41 @@ class Tables(unittest.TestCase):
 
     def test_an_integrator_gets_the_parameters_that_it_lists(self):
         settings = bpy.context.scene.lumicut
-        for identifier, _, _, _, parameters in runtime.require().integrators():
-            self.assertEqual(set(properties.parameters_of(settings, identifier)), {p["id"] for p in parameters}, identifier)
+        for row in runtime.require().integrators():
+            self.assertEqual(set(properties.parameters_of(settings, row.id)), {p["id"] for p in row.parameters}, row.id)
         self.assertNotIn("vpls", properties.parameters_of(settings, "path_tracer"))
         self.assertIn("vpls", {p["id"] for p in properties.tables.common})
 
     def test_presets_set_what_they_promise(self):
         settings = bpy.context.scene.lumicut
-        for name, (_, _, own, integrator, values) in properties.PRESETS.items():
+        rows = {row.id: row for row in runtime.require().integrators()}
+        for name, (_, _, own, integrator) in properties.PRESETS.items():
             bpy.ops.lumicut.preset(preset=name)
             self.assertEqual(settings.integrator, integrator)
             text = properties.parameters_of(settings)
-            for key, value in values.items():
-                if isinstance(value, bool):
-                    self.assertEqual(text[key], str(value).lower())
+            suggested = rows[integrator].presets[name]
+            self.assertTrue(suggested, (name, integrator))
+            for key, value in suggested.items():
+                if value in {"true", "false"}:
+                    self.assertEqual(text[key], value)
                 else:
-                    self.assertAlmostEqual(float(text[key]), value, places=6)
+                    self.assertAlmostEqual(float(text[key]), float(value), places=6)
             for key, value in own.items():
                 self.assertEqual(getattr(settings, key), value)
+
+    def test_previews_take_an_integrator_that_the_library_suggests_for_them(self):
+        for quality in ("interactive", "preview"):
+            integrator, parameters = properties.tables.suggested(quality)
+            self.assertTrue(parameters)
+            self.assertLessEqual(set(parameters), properties.tables.ids[integrator])
+
+    def test_a_library_before_1_4_is_taken_to_have_every_trait_and_to_suggest_nothing(self):
+        old = [row._replace(traits=library.ANY_TRAIT, presets=dict.fromkeys(library.QUALITIES, {}))
+               for row in runtime.require().integrators()]
+        tables = properties.Tables(old)
+        self.assertTrue(tables.has("lightcuts", library.LIGHT_GROUPS))
+        self.assertEqual(tables.suggested("draft", "lightcuts"), ("lightcuts", {}))
+        self.assertEqual(tables.suggested("preview"), (old[0].id, {}))
 
     def test_presets_leave_no_stop_of_the_one_before(self):
         settings = bpy.context.scene.lumicut
@@ -150,22 +168,6 @@ class Tables(unittest.TestCase):
 
 
 class TheLibrary(unittest.TestCase):
-    def test_structures_have_the_sizes_and_fields_of_the_header(self):
-        header = (h.ROOT / "plugin/include/lumicut/lumicut.h").read_text()
-        for cls in library.SIZES:
-            name = "lumicut_" + re.sub(r"(?<!^)([A-Z])", r"_\1", cls.__name__).lower()
-            body = re.search(r"typedef struct " + name + r" \{(.*?)\} " + name + ";", header, re.S)[1]
-            body = re.sub(r"/\*.*?\*/", "", body, flags=re.S)
-            fields = []
-            for line in body.split(";"):
-                line = line.strip()
-                if "(*" in line:
-                    fields.append(re.search(r"\(\*(\w+)\)", line)[1])
-                elif line:
-                    fields += [re.sub(r"\[.*", "", part).split()[-1].lstrip("*") for part in line.split(",")]
-            self.assertEqual([f for f, _ in cls._fields_], fields, name)
-            self.assertEqual(ctypes.sizeof(cls), library.SIZES[cls])
-
     def test_all_ctypes_are_in_one_file(self):
         for path in PACKAGE.glob("*.py"):
             if path.name != "library.py":

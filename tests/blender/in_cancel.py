@@ -115,7 +115,7 @@ class Cancel(unittest.TestCase):
                 self.stop(phase, poll)
 
     def test_each_integrator_ends_soon_while_it_renders(self):
-        for name in (row[0] for row in properties.tables.integrators):
+        for name in (row.id for row in properties.tables.integrators):
             with self.subTest(integrator=name):
                 h.set_lumicut(name, 1024, vpls=20000)
                 self.stop("render", 2)

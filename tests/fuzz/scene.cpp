@@ -12,14 +12,6 @@ using namespace lumicut;
 
 namespace {
 
-io::Api linked_api() {
-  io::Api api;
-#define LUMICUT_LINKED(name) api.name = &lumicut_##name;
-  LUMICUT_FOR_ALL_FUNCTIONS(LUMICUT_LINKED)
-#undef LUMICUT_LINKED
-  return api;
-}
-
 // What the seeds refer to.
 void write_companions(const fuzz::Folder& folder) {
   folder.write("a.mtl", "newmtl a\nKd .5 .5 .5\n");
@@ -50,22 +42,19 @@ void render(const api::Device& device, const api::Scene& scene, const char* meth
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const fuzz::Folder folder;
-  static const io::Api api = linked_api();
   static const api::Device device(1);
   [[maybe_unused]] static const bool once = (write_companions(folder), true);
   try {
     const io::SceneData data_of_scene = io::read_scene(folder.write("scene.json", fuzz::text_of(data, size)));
     if (data_of_scene.triangle_count() > 5000) return 0;
     api::Scene scene(device);
-    io::upload_scene(api, scene.get(), data_of_scene);
+    io::upload_scene(api::linked(), scene.get(), data_of_scene);
     scene.commit();
     static constexpr const char* kMethods[] = {
         "exhaustive",  "lightcuts",   "illumination_cut",     "wspd",
         "light_slice", "path_tracer", "stochastic_lightcuts", "row_column_sampling"};
     render(device, scene, kMethods[size % std::size(kMethods)]);
   } catch (const io::FileError&) {
-  } catch (const io::LibraryError& error) {
-    if (error.code() == LUMICUT_INTERNAL) fuzz::finding(error.what());
   } catch (const api::Exception& error) {
     if (error.code() == LUMICUT_INTERNAL) fuzz::finding(error.what());
   }

@@ -107,9 +107,14 @@ inline api::Integrator integrator(const api::Device& device, int vpls = 400, con
 
 inline std::vector<std::string> integrator_ids() {
   std::vector<std::string> ids;
-  auto info = make<lumicut_integrator_info>();
-  while (lumicut_get_integrator_info(static_cast<uint32_t>(ids.size()), &info) == LUMICUT_OK) ids.emplace_back(info.id);
+  for (const auto& info : api::integrators()) ids.emplace_back(info.id);
   return ids;
+}
+
+inline bool has_virtual_lights(const std::string& id) {
+  for (const auto& info : api::integrators())
+    if (id == info.id) return (info.traits & LUMICUT_VIRTUAL_LIGHTS) != 0;
+  return false;
 }
 
 inline lumicut_render_desc frame(uint32_t width = 48, uint32_t height = 32) {

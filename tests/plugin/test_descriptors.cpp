@@ -6,14 +6,18 @@
 #include <memory>
 
 #include "box_scene.h"
+#include "plugin/descriptors.h"
 
 namespace {
 
 using namespace box;
+using lumicut::FieldSpan;
 
-struct Span {
-  size_t offset, size;
-};
+// test_abi.py compares them with lumicut.h.
+template <typename T>
+std::vector<FieldSpan> fields_of() {
+  return {std::begin(lumicut::Descriptor<T>::fields), std::end(lumicut::Descriptor<T>::fields)};
+}
 
 template <typename T>
 std::vector<unsigned char> bytes_of(const T& t) {
@@ -34,10 +38,10 @@ std::unique_ptr<unsigned char[]> block(size_t size, const std::vector<unsigned c
 }
 
 // What a library that knows only the fields ending within `size` would read.
-std::vector<unsigned char> with_fields_within(const std::vector<unsigned char>& full, const std::vector<Span>& fields,
-                                              size_t size) {
+std::vector<unsigned char> with_fields_within(const std::vector<unsigned char>& full,
+                                              const std::vector<FieldSpan>& fields, size_t size) {
   std::vector<unsigned char> out(full.size(), 0);
-  for (const Span& f : fields)
+  for (const FieldSpan& f : fields)
     if (f.offset + f.size <= size) std::memcpy(out.data() + f.offset, full.data() + f.offset, f.size);
   const auto said = static_cast<uint32_t>(full.size());
   std::memcpy(out.data(), &said, sizeof(said));
@@ -58,7 +62,7 @@ Outcome outcome(const Call& call, const void* descriptor) {
   return {code, lumicut_last_error()};
 }
 
-void check_input(const std::string& name, const std::vector<unsigned char>& valid, const std::vector<Span>& fields,
+void check_input(const std::string& name, const std::vector<unsigned char>& valid, const std::vector<FieldSpan>& fields,
                  const Call& call) {
   SCOPED_TRACE(name);
   ASSERT_EQ(fields.back().offset + fields.back().size, valid.size());
@@ -92,7 +96,7 @@ void check_input(const std::string& name, const std::vector<unsigned char>& vali
                                : LUMICUT_INVALID_ARGUMENT);
 }
 
-void check_output(const std::string& name, size_t known, const std::vector<Span>& fields,
+void check_output(const std::string& name, size_t known, const std::vector<FieldSpan>& fields,
                   const std::function<lumicut_result(void*)>& call) {
   SCOPED_TRACE(name);
   ASSERT_EQ(fields.back().offset + fields.back().size, known);
@@ -109,7 +113,7 @@ void check_output(const std::string& name, size_t known, const std::vector<Span>
     uint32_t said = 0;
     std::memcpy(&said, b.get(), sizeof(said));
     EXPECT_EQ(said, size) << "struct_size is the host's";
-    for (const Span& f : fields) {
+    for (const FieldSpan& f : fields) {
       if (f.offset == 0) continue;
       for (size_t i = f.offset; i < std::min(size, f.offset + f.size); ++i)
         ASSERT_EQ(b[i], f.offset + f.size <= size ? full[i] : 0xab) << "byte " << i;
@@ -119,9 +123,6 @@ void check_output(const std::string& name, size_t known, const std::vector<Span>
   EXPECT_EQ(call(nullptr), LUMICUT_INVALID_ARGUMENT);
 }
 
-#define F(T, field) \
-  Span { offsetof(T, field), sizeof(T::field) }
-
 TEST(Abi, DescriptorsOfAnySizeAreReadByTheGrowthRule) {
   const api::Device device(1);
   api::Scene s = scene(device);
@@ -130,14 +131,12 @@ TEST(Abi, DescriptorsOfAnySizeAreReadByTheGrowthRule) {
     using T = lumicut_device_desc;
     auto d = make<T>();
     d.abi_major = LUMICUT_ABI_MAJOR, d.threads = 1, d.verbosity = 2;
-    check_input("lumicut_device_desc", bytes_of(d),
-                {F(T, struct_size), F(T, abi_major), F(T, threads), F(T, verbosity), F(T, log), F(T, user)},
-                [](const void* p) {
-                  lumicut_device made = nullptr;
-                  const auto code = lumicut_device_create(static_cast<const T*>(p), &made);
-                  lumicut_release(made);
-                  return code;
-                });
+    check_input("lumicut_device_desc", bytes_of(d), fields_of<T>(), [](const void* p) {
+      lumicut_device made = nullptr;
+      const auto code = lumicut_device_create(static_cast<const T*>(p), &made);
+      lumicut_release(made);
+      return code;
+    });
   }
   const Geometry g = geometry();
   {
@@ -146,65 +145,35 @@ TEST(Abi, DescriptorsOfAnySizeAreReadByTheGrowthRule) {
     d.robust = 1, d.kind = "embree";
     d.positions = g.positions.data(), d.position_count = g.positions.size() / 3, d.position_stride = 12;
     d.indices = g.indices.data(), d.triangle_count = g.indices.size() / 3;
-    check_input("lumicut_accel_desc", bytes_of(d),
-                {F(T, struct_size), F(T, robust), F(T, kind), F(T, builder), F(T, positions), F(T, position_count),
-                 F(T, position_stride), F(T, indices), F(T, triangle_count), F(T, boxes), F(T, box_count)},
-                [&](const void* p) {
-                  lumicut_accel made = nullptr;
-                  const auto code = lumicut_accel_build(device.get(), static_cast<const T*>(p), &made);
-                  lumicut_release(made);
-                  return code;
-                });
+    check_input("lumicut_accel_desc", bytes_of(d), fields_of<T>(), [&](const void* p) {
+      lumicut_accel made = nullptr;
+      const auto code = lumicut_accel_build(device.get(), static_cast<const T*>(p), &made);
+      lumicut_release(made);
+      return code;
+    });
   }
   {
     using T = lumicut_scene_desc;
     auto d = make<T>();
     d.robust = 1, d.accel = "bvh", d.builder = "sweep";
-    check_input("lumicut_scene_desc", bytes_of(d), {F(T, struct_size), F(T, robust), F(T, accel), F(T, builder)},
-                [&](const void* p) {
-                  lumicut_scene made = nullptr;
-                  const auto code = lumicut_scene_create(device.get(), static_cast<const T*>(p), &made);
-                  lumicut_release(made);
-                  return code;
-                });
+    check_input("lumicut_scene_desc", bytes_of(d), fields_of<T>(), [&](const void* p) {
+      lumicut_scene made = nullptr;
+      const auto code = lumicut_scene_create(device.get(), static_cast<const T*>(p), &made);
+      lumicut_release(made);
+      return code;
+    });
   }
   {
     using T = lumicut_texture;
     const unsigned char pixels[12] = {};
     auto d = make<T>();
     d.width = 2, d.height = 2, d.channels = 3, d.format = LUMICUT_UINT8, d.flags = LUMICUT_SRGB, d.pixels = pixels;
-    check_input("lumicut_texture", bytes_of(d),
-                {F(T, struct_size), F(T, width), F(T, height), F(T, channels), F(T, format), F(T, flags), F(T, pixels)},
+    check_input("lumicut_texture", bytes_of(d), fields_of<T>(),
                 [&](const void* p) { return lumicut_scene_set_textures(s.get(), static_cast<const T*>(p), 1); });
   }
   {
     using T = lumicut_material;
-    check_input("lumicut_material", bytes_of(materials()[3]),
-                {F(T, struct_size),
-                 F(T, flags),
-                 F(T, diffuse),
-                 F(T, shininess),
-                 F(T, specular),
-                 F(T, opacity),
-                 F(T, emission),
-                 F(T, diffuse_texture),
-                 F(T, specular_texture),
-                 F(T, opacity_texture),
-                 F(T, emission_texture),
-                 F(T, roughness),
-                 F(T, metallic),
-                 F(T, ior),
-                 F(T, transmission),
-                 F(T, normal_texture),
-                 F(T, normal_strength),
-                 F(T, height_texture),
-                 F(T, bump_distance),
-                 F(T, bump_strength),
-                 F(T, roughness_texture),
-                 F(T, metallic_texture),
-                 F(T, coat),
-                 F(T, coat_roughness),
-                 F(T, coat_ior)},
+    check_input("lumicut_material", bytes_of(materials()[3]), fields_of<T>(),
                 [&](const void* p) { return lumicut_scene_set_materials(s.get(), static_cast<const T*>(p), 1); });
   }
   {
@@ -212,47 +181,36 @@ TEST(Abi, DescriptorsOfAnySizeAreReadByTheGrowthRule) {
     auto d = g.mesh();
     const float transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     d.transforms = transform, d.transform_count = 1, d.material = 1, d.group = 2, d.mask = 3;
-    check_input(
-        "lumicut_mesh", bytes_of(d),
-        {F(T, struct_size), F(T, mask), F(T, positions), F(T, normals), F(T, uvs), F(T, vertex_count), F(T, indices),
-         F(T, triangle_count), F(T, materials), F(T, transforms), F(T, transform_count), F(T, material), F(T, group)},
-        [&](const void* p) { return lumicut_scene_add_mesh(s.get(), static_cast<const T*>(p), nullptr); });
+    check_input("lumicut_mesh", bytes_of(d), fields_of<T>(),
+                [&](const void* p) { return lumicut_scene_add_mesh(s.get(), static_cast<const T*>(p), nullptr); });
   }
   {
     using T = lumicut_profile;
     const float angles[2] = {0, 1}, values[2] = {3, 1};
     auto d = make<T>();
     d.vertical_count = 2, d.horizontal_count = 1, d.vertical = angles, d.horizontal = angles, d.values = values;
-    check_input("lumicut_profile", bytes_of(d),
-                {F(T, struct_size), F(T, vertical_count), F(T, horizontal_count), F(T, reserved), F(T, vertical),
-                 F(T, horizontal), F(T, values)},
+    check_input("lumicut_profile", bytes_of(d), fields_of<T>(),
                 [&](const void* p) { return lumicut_scene_set_profiles(s.get(), static_cast<const T*>(p), 1); });
   }
   {
     using T = lumicut_light;
     auto d = lamp();
     d.spread = 1;
-    check_input("lumicut_light", bytes_of(d),
-                {F(T, struct_size), F(T, type), F(T, unit), F(T, group), F(T, color), F(T, value), F(T, position),
-                 F(T, radius), F(T, direction), F(T, angle), F(T, u), F(T, blend), F(T, v), F(T, spread),
-                 F(T, spot_cosine), F(T, profile), F(T, tangent)},
+    check_input("lumicut_light", bytes_of(d), fields_of<T>(),
                 [&](const void* p) { return lumicut_scene_set_lights(s.get(), static_cast<const T*>(p), 1); });
   }
   {
     using T = lumicut_environment;
     auto d = make<T>();
     d.color[0] = 1, d.flags = LUMICUT_HIDDEN, d.world_to_map[0] = d.world_to_map[4] = d.world_to_map[8] = 1;
-    check_input("lumicut_environment", bytes_of(d),
-                {F(T, struct_size), F(T, group), F(T, color), F(T, texture), F(T, world_to_map), F(T, flags)},
+    check_input("lumicut_environment", bytes_of(d), fields_of<T>(),
                 [&](const void* p) { return lumicut_scene_set_environment(s.get(), static_cast<const T*>(p)); });
   }
   {
     using T = lumicut_camera;
     auto d = camera();
     d.pixel_aspect = 1, d.lens_radius = 0.1f, d.focus_distance = 2;
-    check_input("lumicut_camera", bytes_of(d),
-                {F(T, struct_size), F(T, orthographic), F(T, to_world), F(T, fov_y), F(T, height), F(T, shift),
-                 F(T, near_clip), F(T, far_clip), F(T, pixel_aspect), F(T, lens_radius), F(T, focus_distance)},
+    check_input("lumicut_camera", bytes_of(d), fields_of<T>(),
                 [&](const void* p) { return lumicut_scene_set_camera(s.get(), static_cast<const T*>(p)); });
   }
   {
@@ -260,8 +218,7 @@ TEST(Abi, DescriptorsOfAnySizeAreReadByTheGrowthRule) {
     auto d = make<T>();
     d.intersect = [](void*, lumicut_rayhit*, uint64_t) {};
     d.occluded = [](void*, lumicut_ray*, uint64_t) {};
-    check_input("lumicut_trace", bytes_of(d),
-                {F(T, struct_size), F(T, batch), F(T, intersect), F(T, occluded), F(T, user)},
+    check_input("lumicut_trace", bytes_of(d), fields_of<T>(),
                 [&](const void* p) { return lumicut_scene_set_trace(s.get(), static_cast<const T*>(p)); });
   }
   {
@@ -270,27 +227,22 @@ TEST(Abi, DescriptorsOfAnySizeAreReadByTheGrowthRule) {
     const api::Integrator i = integrator(device, 10);
     auto d = make<T>();
     d.width = 16, d.height = 16, d.samples = 1, d.crop[2] = d.crop[3] = 8, d.tile_size = 8;
-    check_input(
-        "lumicut_render_desc", bytes_of(d),
-        {F(T, struct_size), F(T, width), F(T, height), F(T, samples), F(T, crop), F(T, tile_size), F(T, passes),
-         F(T, max_seconds), F(T, target_error), F(T, confidence), F(T, flags), F(T, checkpoint), F(T, checkpoint_size)},
-        [&](const void* p) {
-          lumicut_render made = nullptr;
-          const auto code = lumicut_render_start(i.get(), fresh.get(), static_cast<const T*>(p), &made);
-          lumicut_release(made);
-          return code;
-        });
+    check_input("lumicut_render_desc", bytes_of(d), fields_of<T>(), [&](const void* p) {
+      lumicut_render made = nullptr;
+      const auto code = lumicut_render_start(i.get(), fresh.get(), static_cast<const T*>(p), &made);
+      lumicut_release(made);
+      return code;
+    });
     const api::Render r(i, fresh, d);
     r.wait();
     using Tile = lumicut_tile;
     auto tile = make<Tile>();
     tile.x1 = tile.y1 = 4;
-    check_input("lumicut_tile", bytes_of(tile),
-                {F(Tile, struct_size), F(Tile, x0), F(Tile, y0), F(Tile, x1), F(Tile, y1)}, [&](const void* p) {
-                  float pixels[8 * 8];
-                  if (p == nullptr) return lumicut_result{LUMICUT_INVALID_ARGUMENT};  // NULL is the crop
-                  return lumicut_render_read(r.get(), "depth", static_cast<const Tile*>(p), pixels);
-                });
+    check_input("lumicut_tile", bytes_of(tile), fields_of<Tile>(), [&](const void* p) {
+      float pixels[8 * 8];
+      if (p == nullptr) return lumicut_result{LUMICUT_INVALID_ARGUMENT};  // NULL is the crop
+      return lumicut_render_read(r.get(), "depth", static_cast<const Tile*>(p), pixels);
+    });
   }
 }
 
@@ -311,41 +263,32 @@ TEST(Abi, DescriptorsThatTheLibraryFillsAreFilledAsFarAsTheyReach) {
 
   {
     using T = lumicut_status;
-    const std::vector<Span> fields = {F(T, struct_size),  F(T, state),      F(T, phase),       F(T, fraction),
-                                      F(T, seconds),      F(T, tiles_done), F(T, tiles_total), F(T, passes_done),
-                                      F(T, passes_total), F(T, error)};
-    check_output("lumicut_status", sizeof(T), fields,
+    check_output("lumicut_status", sizeof(T), fields_of<T>(),
                  [&](void* p) { return lumicut_get_status(r.get(), static_cast<T*>(p)); });
   }
   {
     using T = lumicut_accel_info;
-    check_output("lumicut_accel_info", sizeof(T),
-                 {F(T, struct_size), F(T, node_count), F(T, primitive_count), F(T, bytes), F(T, build_seconds),
-                  F(T, expected_boxes), F(T, expected_primitives), F(T, expected_cost), F(T, lower), F(T, upper)},
+    check_output("lumicut_accel_info", sizeof(T), fields_of<T>(),
                  [&](void* p) { return lumicut_accel_get_info(accel.get(), static_cast<T*>(p)); });
   }
   {
     using T = lumicut_integrator_info;
-    check_output("lumicut_integrator_info", sizeof(T),
-                 {F(T, struct_size), F(T, param_count), F(T, id), F(T, label), F(T, description), F(T, source)},
+    check_output("lumicut_integrator_info", sizeof(T), fields_of<T>(),
                  [&](void* p) { return lumicut_get_integrator_info(0, static_cast<T*>(p)); });
   }
   {
     using T = lumicut_param_info;
-    check_output("lumicut_param_info", sizeof(T),
-                 {F(T, struct_size), F(T, type), F(T, id), F(T, label), F(T, description), F(T, unit), F(T, choices),
-                  F(T, default_text), F(T, minimum), F(T, maximum)},
+    check_output("lumicut_param_info", sizeof(T), fields_of<T>(),
                  [&](void* p) { return lumicut_get_param_info("exhaustive", 0, static_cast<T*>(p)); });
   }
   {
     using T = lumicut_channel_info;
-    check_output("lumicut_channel_info", sizeof(T),
-                 {F(T, struct_size), F(T, components), F(T, name), F(T, description)},
+    check_output("lumicut_channel_info", sizeof(T), fields_of<T>(),
                  [&](void* p) { return lumicut_get_channel_info(0, static_cast<T*>(p)); });
   }
   {
     using T = lumicut_tile;
-    check_output("lumicut_tile", sizeof(T), {F(T, struct_size), F(T, x0), F(T, y0), F(T, x1), F(T, y1)},
+    check_output("lumicut_tile", sizeof(T), fields_of<T>(),
                  [&](void* p) { return lumicut_render_next_tile(r.get(), static_cast<T*>(p)); });
   }
 }

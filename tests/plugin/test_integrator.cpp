@@ -1,10 +1,13 @@
 // Level 3: parameters that tell of themselves, lights in and out, and shading of a host's points.
 #include <cstring>
+#include <map>
 #include <numbers>
 #include <set>
+#include <sstream>
 #include <thread>
 
 #include "full_host.h"
+#include "lumicut/lumicut_state.h"
 
 namespace {
 
@@ -43,6 +46,112 @@ TEST(Integrators, TellTheirParametersAndTakeTheirDefaults) {
   EXPECT_CODE(lumicut_get_param_info("no_such", 0, nullptr), LUMICUT_INVALID_ARGUMENT, "\"no_such\" is not known");
   lumicut_integrator none = nullptr;
   EXPECT_CODE(lumicut_integrator_create(device.get(), "no_such", &none), LUMICUT_INVALID_ARGUMENT, "exhaustive");
+}
+
+std::map<std::string, lumicut_integrator_info> infos() {
+  std::map<std::string, lumicut_integrator_info> all;
+  for (const auto& info : api::integrators()) all[info.id] = info;
+  return all;
+}
+
+TEST(Integrators, EveryTraitIsWhatTheIntegratorDoes) {
+  const api::Device device(2);
+  const api::Scene s = scene(device);
+  const auto* state = api::extension<lumicut_state_extension>(LUMICUT_STATE_EXTENSION);
+  ASSERT_NE(state, nullptr);
+  for (const auto& [id, info] : infos()) {
+    SCOPED_TRACE(id);
+    const auto has = [t = info.traits](uint32_t trait) { return (t & trait) != 0; };
+    EXPECT_NE(info.traits, 0u) << "0 is for libraries that do not tell";
+    EXPECT_EQ(info.reserved, 0u);
+    std::set<std::string> listed;
+    for (const auto& p : api::params(id)) listed.insert(p.id);
+    EXPECT_EQ(has(LUMICUT_VIRTUAL_LIGHTS), listed.count("vpls") == 1);
+    EXPECT_EQ(has(LUMICUT_COMPENSATION), listed.count("compensate") == 1);
+    api::Integrator i(device, id.c_str());
+    if (has(LUMICUT_VIRTUAL_LIGHTS)) i.set("vpls", "50");
+    i.prepare(s);
+    EXPECT_EQ(has(LUMICUT_VIRTUAL_LIGHTS), !i.lights().empty());
+    uint64_t size = 0;
+    EXPECT_EQ(state->save(i.get(), nullptr, &size), has(LUMICUT_SAVED_STATE) ? LUMICUT_OK : LUMICUT_UNSUPPORTED);
+    auto grouped = frame(8, 8);
+    grouped.flags = LUMICUT_GROUPS;
+    if (has(LUMICUT_LIGHT_GROUPS)) {
+      const api::Render r(i, s, grouped);
+      r.wait();
+      EXPECT_EQ(r.groups(), std::vector<uint32_t>{0});
+    } else {
+      EXPECT_THROW(api::Render(i, s, grouped), api::Exception);
+    }
+  }
+}
+
+TEST(Integrators, AllLightsMeansTheSumOfEachLightAlone) {
+  const api::Device device(2);
+  const api::Scene s = scene(device);
+  lumicut_point p{};
+  p.position[2] = -1.9f;
+  p.normal[2] = p.geometric_normal[2] = p.to_viewer[2] = 1;
+  size_t found = 0;
+  for (const auto& [id, info] : infos()) {
+    SCOPED_TRACE(id);
+    if ((info.traits & LUMICUT_ALL_LIGHTS) == 0) continue;
+    ++found;
+    api::Integrator i = integrator(device, 50, id.c_str());
+    i.prepare(s);
+    const auto lights = i.lights();
+    const float all = i.shade({p})[0];
+    double sum = 0;
+    for (const lumicut_vpl& light : lights) {
+      i.set_lights({light});
+      i.prepare(s);
+      sum += i.shade({p})[0];
+    }
+    EXPECT_GT(all, 0);
+    EXPECT_NEAR(all, sum, 1e-5 * sum) << "single precision adds in another order";
+  }
+  EXPECT_GT(found, 0u);
+}
+
+TEST(Integrators, SuggestedParametersAreTaken) {
+  const api::Device device(1);
+  std::map<std::string, int> suggestions;
+  for (const auto& [id, info] : infos()) {
+    SCOPED_TRACE(id);
+    for (const auto& [quality, preset] : {std::pair{"interactive", info.interactive},
+                                          {"preview", info.preview},
+                                          {"draft", info.draft},
+                                          {"good", info.good},
+                                          {"reference", info.reference}}) {
+      ASSERT_NE(preset, nullptr);
+      if (*preset == 0) continue;
+      ++suggestions[quality];
+      api::Integrator i(device, id.c_str());
+      i.apply(preset);
+      std::set<std::string> listed;
+      for (const auto& p : api::params(id)) listed.insert(p.id);
+      std::istringstream pairs(preset);
+      for (std::string pair; pairs >> pair;) {
+        const std::string name = pair.substr(0, pair.find('='));
+        EXPECT_EQ(listed.count(name), 1u) << name;
+        const std::string value = pair.substr(name.size() + 1);
+        EXPECT_EQ(i.value(name.c_str()), value == "true" ? "1" : value);
+      }
+    }
+  }
+  EXPECT_EQ(suggestions.size(), 5u) << "each quality has an integrator";
+  EXPECT_THROW(api::Integrator(device, "lightcuts").apply("error"), api::Exception);
+}
+
+// A host of ABI 1.3 has 40 bytes for it.
+TEST(Integrators, HostsThatKnowNoTraitsGetTheRest) {
+  lumicut_integrator_info old;
+  std::memset(static_cast<void*>(&old), 0x5a, sizeof(old));
+  old.struct_size = offsetof(lumicut_integrator_info, traits);
+  EXPECT_EQ(old.struct_size, 40u);
+  ASSERT_EQ(lumicut_get_integrator_info(0, &old), LUMICUT_OK);
+  EXPECT_STREQ(old.id, "exhaustive");
+  EXPECT_EQ(old.traits, 0x5a5a5a5au) << "is the host's own memory";
 }
 
 // Hosts may set the parameters of virtual lights on any integrator. One without such lights does not list them, warns,

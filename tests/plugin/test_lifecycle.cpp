@@ -63,7 +63,7 @@ void lead_life(int n) {
   api::check(lumicut_scene_commit(s.get()));
   const std::string& id = ids[static_cast<size_t>(n) % ids.size()];
   api::Integrator i(device, id.c_str());
-  if (id != "path_tracer") i.set("vpls", "60");
+  if (has_virtual_lights(id)) i.set("vpls", "60");
   lumicut_render_desc d = frame(24, 16);
   d.passes = 2, d.flags = LUMICUT_CHECKPOINTS;
   const api::Render r(i, s, d);

@@ -22,6 +22,8 @@ class Info(Cli):
         self.assert_ends(result, OK)
         info = json.loads(result.stdout)
         integrators = {i["id"]: {p["id"] for p in i["parameters"]} for i in info["integrators"]}
+        traits = {i["id"]: set(i["traits"]) for i in info["integrators"]}
+        presets = {i["id"]: i["presets"] for i in info["integrators"]}
         self.assertIn("exhaustive", integrators)
         self.assertIn("lightcuts", integrators)
         self.assertIn("error", integrators["lightcuts"])
@@ -29,6 +31,10 @@ class Info(Cli):
         self.assertEqual(tracer, {"seed", "max_depth", "samples"}, "what virtual lights need has no effect on it")
         for parameters in integrators.values():
             self.assertLessEqual({"vpls", "seed", "clamp_distance"}, parameters)
+        self.assertEqual({name for name in traits if "virtual_lights" not in traits[name]}, {"path_tracer"})
+        self.assertEqual({name for name in traits if "saved_state" in traits[name]}, {"wspd"})
+        self.assertEqual({name for name in traits if "all_lights" in traits[name]}, {"exhaustive"})
+        self.assertEqual(presets["lightcuts"]["good"], "vpls=60000 error=0.02")
         self.assertIn("radiance", [c["name"] for c in info["channels"]])
         text = lumicut("info").stdout
         for name in integrators:
@@ -58,6 +64,7 @@ class Usage(Cli):
         self.assert_ends(self.render("-o", out, "-i", "lightcuts", "-p", "error=much"), USAGE, "much")
         self.assert_ends(self.render("-o", out, "--layers", "radiance,colour"), USAGE, "colour", "depth")
         self.assert_ends(self.render("-o", out, "--accel", "octree"), USAGE, "octree")
+        self.assert_ends(self.render("-o", out, "--groups", "-i", "path_tracer"), USAGE, "--groups", "path_tracer")
         self.assert_ends(self.render("-o", out, "--builder", "magic"), USAGE, "magic", "binned-agglomerative")
         self.assert_ends(self.render("-o", out, "--accel", "embree", "--builder", "sweep"), USAGE, "builder")
         self.assert_ends(self.render("-o", out, "--crop", "0,0,30,10"), USAGE, "0,0,30,10", "24 x 24")

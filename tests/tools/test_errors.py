@@ -57,7 +57,7 @@ class Errors(Cli):
         self.assertEqual(json.loads(same.stdout)["rmse"], 0)  # the image that is taken apart is that of `render`
 
     def test_wrong_words_and_black_scenes_are_named(self):
-        self.assert_ends(lumicut("errors", SCENE, "-i", "path_tracer"), USAGE, "path_tracer")
+        self.assert_ends(lumicut("errors", SCENE, "-i", "path_tracer"), USAGE, "path_tracer", "no virtual lights")
         self.assert_ends(lumicut("errors", SCENE, "--sets", "1"), USAGE, "--sets")
         self.assert_ends(lumicut("errors", self.folder / "none.json"), BAD_FILE, "none.json")
         scene = self.folder / "black.json"

@@ -1,5 +1,34 @@
 /* Lumicut: many-lights global illumination for any host renderer. The whole C ABI. C99 and later, C++ too.
  *
+ * A picture (a test compiles and runs these lines):
+ *
+ *   lumicut_device device = NULL; lumicut_scene scene = NULL;
+ *   lumicut_integrator integrator = NULL; lumicut_render render = NULL;
+ *   const lumicut_device_desc threads = {.struct_size = sizeof threads, .abi_major = LUMICUT_ABI_MAJOR};  // 0 threads: all
+ *   const lumicut_material grey = {.struct_size = sizeof grey, .diffuse = {0.7f, 0.7f, 0.7f}};
+ *   const float corners[] = {-2, 0, -2,  2, 0, -2,  2, 0, 2,  -2, 0, 2};
+ *   const uint32_t triangles[] = {0, 2, 1,  0, 3, 2};
+ *   const lumicut_mesh ground = {.struct_size = sizeof ground, .positions = corners, .vertex_count = 4,
+ *                                .indices = triangles, .triangle_count = 2};
+ *   const lumicut_light lamp = {.struct_size = sizeof lamp, .type = LUMICUT_POINT, .unit = LUMICUT_WATT,
+ *                               .color = {1, 1, 1}, .value = 100, .position = {0, 2, 0}};
+ *   const lumicut_camera camera = {.struct_size = sizeof camera, .to_world = {1,0,0,0, 0,1,0,1, 0,0,1,5}, .fov_y = 0.8f};
+ *   const lumicut_render_desc frame = {.struct_size = sizeof frame, .width = 640, .height = 480};
+ *   static float radiance[3 * 640 * 480];                     // rows from the top
+ *   lumicut_device_create(&threads, &device);
+ *   lumicut_scene_create(device, NULL, &scene);
+ *   lumicut_scene_set_materials(scene, &grey, 1);
+ *   lumicut_scene_add_mesh(scene, &ground, NULL);
+ *   lumicut_scene_set_lights(scene, &lamp, 1);
+ *   lumicut_scene_set_camera(scene, &camera);
+ *   lumicut_scene_commit(scene);
+ *   lumicut_integrator_create(device, "lightcuts", &integrator);
+ *   lumicut_integrator_set(integrator, "vpls", "10000");
+ *   lumicut_render_start(integrator, scene, &frame, &render);  // in the background
+ *   if (lumicut_render_wait(render, LUMICUT_FOREVER, NULL) != LUMICUT_OK) puts(lumicut_last_error());
+ *   lumicut_render_read(render, "radiance", NULL, radiance);
+ *   lumicut_release(render); lumicut_release(integrator); lumicut_release(scene); lumicut_release(device);
+ *
  * Space     world is right-handed, metres (or any unit, used throughout); colour is linear Rec.709; angles are radians;
  *           radiance W/(sr m2), intensity W/sr, irradiance W/m2. Matrices are row-major 3x4 affine maps (p' = M p).
  * Growth    every descriptor starts with struct_size = sizeof(itself). Fields are only ever appended: missing ones take
@@ -35,8 +64,9 @@ extern "C" {
 #endif
 
 #define LUMICUT_ABI_MAJOR 1
-#define LUMICUT_ABI_MINOR 3
+#define LUMICUT_ABI_MINOR 4
 #define LUMICUT_FOREVER 0xffffffffu /* milliseconds */
+#define LUMICUT_NO_ID 0xffffffffu   /* no hit, no child */
 
 typedef int32_t lumicut_result;
 enum {
@@ -54,7 +84,6 @@ typedef struct lumicut_render_t* lumicut_render;
 
 LUMICUT_API const char* lumicut_version(uint32_t* abi_major, uint32_t* abi_minor); /* [any] "1.0.0"; either may be NULL */
 LUMICUT_API const char* lumicut_last_error(void); /* [any] this thread's last failure; "" if none */
-LUMICUT_API const void* lumicut_get_extension(const char* id); /* [any] table of an optional extension, NULL if absent */
 
 typedef struct lumicut_device_desc {
   uint32_t struct_size;
@@ -69,81 +98,7 @@ LUMICUT_API lumicut_result lumicut_device_create(const lumicut_device_desc* desc
 LUMICUT_API void lumicut_retain(void* handle);  /* [any] any handle */
 LUMICUT_API void lumicut_release(void* handle); /* [any] a running render is cancelled and waited for */
 
-typedef struct lumicut_status {
-  uint32_t struct_size;
-  int32_t state;       /* LUMICUT_IDLE ... */
-  const char* phase;   /* what runs now, such as "light tree"; static string */
-  double fraction;     /* of the phase, 0..1 */
-  double seconds;      /* since the work began */
-  uint64_t tiles_done; /* renders alone */
-  uint64_t tiles_total;
-  uint32_t passes_done;  /* renders alone: whole passes */
-  uint32_t passes_total; /* 0: until stopped */
-  double error;          /* `confidence` of the pixels have a half interval of at most this share of their luminance (of a
-                            tenth of the image's mean where that is larger); infinite before two passes */
-} lumicut_status;
-enum { LUMICUT_IDLE = 0, LUMICUT_RUNNING = 1, LUMICUT_DONE = 2, LUMICUT_STOPPED = 3, LUMICUT_FAILED = 4 };
-
-/* Of accel, scene, integrator or render, while a call of it works in another thread. */
-LUMICUT_API lumicut_result lumicut_get_status(void* handle, lumicut_status* status); /* [any] */
-LUMICUT_API lumicut_result lumicut_cancel(void* handle); /* [any] what runs returns LUMICUT_CANCELLED soon; the object stays usable; idle: nothing */
-LUMICUT_API const char* lumicut_stats_json(void* handle); /* [object] counters and seconds per phase of the last work; view; docs/c_abi.md */
-
-/* ---- Level 1, accel: rays against triangles or boxes. Ray and hit fields are Embree's, in Embree's order ---------- */
-
-typedef struct lumicut_ray {
-  float org_x, org_y, org_z, tnear, dir_x, dir_y, dir_z, time, tfar;
-  uint32_t mask, id, flags;
-} lumicut_ray;
-typedef struct lumicut_hit {
-  float ng_x, ng_y, ng_z, u, v;
-  uint32_t prim_id, geom_id, inst_id; /* geom_id is LUMICUT_NO_ID where nothing was hit */
-} lumicut_hit;
-typedef struct lumicut_rayhit {
-  lumicut_ray ray;
-  lumicut_hit hit;
-} lumicut_rayhit;
-#define LUMICUT_NO_ID 0xffffffffu
-
-typedef struct lumicut_accel_desc {
-  uint32_t struct_size;
-  uint32_t robust;         /* LUMICUT_ROBUST (default, also 0) or LUMICUT_FAST */
-  const char* kind;        /* "bvh" (default), the library's own ("agglomerative" is its name of before 1.3), or "embree" */
-  const char* builder;     /* "bvh" alone: see docs/embree_dropin.md; NULL: the default */
-  const float* positions;  /* xyz */
-  uint64_t position_count;
-  uint64_t position_stride; /* bytes; 0: 12 */
-  const uint32_t* indices; /* three a triangle */
-  uint64_t triangle_count;
-  const float* boxes;      /* instead of triangles: six floats a box, lower and upper corner; rays hit the boxes themselves */
-  uint64_t box_count;
-} lumicut_accel_desc;
-enum { LUMICUT_ROBUST = 1, LUMICUT_FAST = 2 }; /* watertight on shared edges; a little faster: some rays slip through them */
-
-typedef struct lumicut_accel_info {
-  uint32_t struct_size;
-  uint32_t node_count;    /* of the binary tree that lumicut_accel_node shows; 0: the kind does not show it */
-  uint64_t primitive_count, bytes;
-  double build_seconds;
-  double expected_boxes, expected_primitives, expected_cost; /* Walter et al. 2008, Fig. 6 */
-  float lower[3], upper[3];
-} lumicut_accel_info;
-
-typedef struct lumicut_accel_node_info {
-  uint32_t struct_size;
-  uint32_t left, right;    /* children; LUMICUT_NO_ID in a leaf. Node 0 is the root */
-  uint32_t first, count;   /* a leaf's primitives: lumicut_accel_primitive order */
-  float lower[3], upper[3];
-} lumicut_accel_node_info;
-
-LUMICUT_API lumicut_result lumicut_accel_build(lumicut_device device, const lumicut_accel_desc* desc, lumicut_accel* accel); /* [any] */
-LUMICUT_API lumicut_result lumicut_accel_get_info(lumicut_accel accel, lumicut_accel_info* info); /* [shared] */
-LUMICUT_API lumicut_result lumicut_accel_get_node(lumicut_accel accel, uint32_t index, lumicut_accel_node_info* node); /* [shared] */
-LUMICUT_API lumicut_result lumicut_accel_get_primitives(lumicut_accel accel, const uint32_t** ids, uint64_t* count); /* [shared] view: leaf order -> primitive */
-LUMICUT_API lumicut_result lumicut_accel_intersect(lumicut_accel accel, lumicut_rayhit* rays, uint64_t count); /* [shared] closest hits */
-LUMICUT_API lumicut_result lumicut_accel_occluded(lumicut_accel accel, lumicut_ray* rays, uint64_t count); /* [shared] tfar = -inf where hit */
-
-/* ---- Level 2, scenes ---------------------------------------------------------------------------------------------- */
+/* ---- Level 2, scenes: materials, meshes, lights, a camera --------------------------------------------------------- */
 
 typedef struct lumicut_scene_desc {
   uint32_t struct_size;
@@ -151,17 +106,6 @@ typedef struct lumicut_scene_desc {
   const char* accel;   /* as `kind` there; the host's own with lumicut_scene_set_trace */
   const char* builder; /* as there */
 } lumicut_scene_desc;
-
-typedef struct lumicut_texture {
-  uint32_t struct_size;
-  uint32_t width, height;
-  uint32_t channels; /* 1..4 */
-  uint32_t format;   /* LUMICUT_UINT8 (0..255 -> 0..1) or LUMICUT_FLOAT32 */
-  uint32_t flags;    /* LUMICUT_SRGB: decode; LUMICUT_CLAMP: no repeat; LUMICUT_NEAREST: no filter */
-  const void* pixels; /* row 0 is the top row (v = 1), rows packed */
-} lumicut_texture;
-enum { LUMICUT_UINT8 = 0, LUMICUT_FLOAT32 = 1 };
-enum { LUMICUT_SRGB = 1, LUMICUT_CLAMP = 2, LUMICUT_NEAREST = 4 };
 
 typedef struct lumicut_material {
   uint32_t struct_size;
@@ -233,27 +177,6 @@ typedef struct lumicut_light {
 enum { LUMICUT_POINT = 0, LUMICUT_SPOT = 1, LUMICUT_RECTANGLE = 2, LUMICUT_DISK = 3, LUMICUT_SUN = 4 };
 enum { LUMICUT_RADIOMETRIC = 0, LUMICUT_WATT = 1 };
 
-/* Intensity by direction, as photometric files have it: bilinear between its angles, 0 beyond the vertical ones. */
-typedef struct lumicut_profile {
-  uint32_t struct_size;
-  uint32_t vertical_count, horizontal_count; /* at least 2; 1 (the same all around) or at least 2 */
-  uint32_t reserved;
-  const float* vertical;   /* radians from the light's direction, rising within 0..pi */
-  const float* horizontal; /* radians about it, rising from 0 to 2 pi; from tangent towards tangent x direction */
-  const float* values;     /* W/sr, vertical_count for each horizontal angle */
-} lumicut_profile;
-
-typedef struct lumicut_environment {
-  uint32_t struct_size;
-  uint32_t group;
-  float color[3];       /* radiance, multiplies the texture */
-  int32_t texture;      /* 1 + index, latitude-longitude; 0: constant */
-  float world_to_map[9]; /* row-major rotation; all 0: identity. In map space z is up: u = 1/2 - atan2(y,x)/2pi,
-                            v = 1/2 + atan2(z,hypot(x,y))/pi */
-  uint32_t flags;       /* LUMICUT_HIDDEN: it lights the scene, but camera rays that leave it bring black */
-} lumicut_environment;
-enum { LUMICUT_HIDDEN = 1 };
-
 typedef struct lumicut_camera {
   uint32_t struct_size;
   uint32_t orthographic;
@@ -267,88 +190,19 @@ typedef struct lumicut_camera {
   float focus_distance; /* along the forward axis */
 } lumicut_camera;
 
-/* The host's own tracer, in batches: fill hits (closest) / set tfar = -inf (occluded). geom_id is the mesh's id, inst_id the
-   index of its transform. */
-typedef struct lumicut_trace {
-  uint32_t struct_size;
-  uint32_t batch; /* most rays a call; 0: 65536 */
-  void (*intersect)(void* user, lumicut_rayhit* rays, uint64_t count);
-  void (*occluded)(void* user, lumicut_ray* rays, uint64_t count);
-  void* user;
-} lumicut_trace;
-
 LUMICUT_API lumicut_result lumicut_scene_create(lumicut_device device, const lumicut_scene_desc* desc, lumicut_scene* scene); /* [any] desc NULL: defaults */
 /* All setters are [object], replace what was set, and take effect at the next commit. */
-LUMICUT_API lumicut_result lumicut_scene_set_textures(lumicut_scene scene, const lumicut_texture* textures, uint64_t count);
 LUMICUT_API lumicut_result lumicut_scene_set_materials(lumicut_scene scene, const lumicut_material* materials, uint64_t count);
 LUMICUT_API lumicut_result lumicut_scene_add_mesh(lumicut_scene scene, const lumicut_mesh* mesh, uint32_t* id);
-/* New positions of the same topology (and normals, or NULL), new transforms (count as before, or NULL: unchanged). */
-LUMICUT_API lumicut_result lumicut_scene_update_mesh(lumicut_scene scene, uint32_t id, const float* positions, const float* normals, const float* transforms);
 LUMICUT_API lumicut_result lumicut_scene_set_lights(lumicut_scene scene, const lumicut_light* lights, uint64_t count);
-LUMICUT_API lumicut_result lumicut_scene_set_profiles(lumicut_scene scene, const lumicut_profile* profiles, uint64_t count); /* for lights set after; lights keep theirs */
-LUMICUT_API lumicut_result lumicut_scene_set_environment(lumicut_scene scene, const lumicut_environment* environment); /* NULL: black */
 LUMICUT_API lumicut_result lumicut_scene_set_camera(lumicut_scene scene, const lumicut_camera* camera);
-LUMICUT_API lumicut_result lumicut_scene_set_trace(lumicut_scene scene, const lumicut_trace* trace); /* NULL: ours again */
 LUMICUT_API lumicut_result lumicut_scene_commit(lumicut_scene scene); /* [object] builds; refused while a render uses the scene */
 
-/* ---- Level 3, integrators ----------------------------------------------------------------------------------------- */
+/* ---- Level 3, integrators: chosen by name, set by text ------------------------------------------------------------ */
 
-typedef struct lumicut_integrator_info {
-  uint32_t struct_size;
-  uint32_t param_count;
-  const char *id, *label, *description, *source; /* source: the paper */
-} lumicut_integrator_info;
-
-typedef struct lumicut_param_info {
-  uint32_t struct_size;
-  uint32_t type; /* LUMICUT_FLOAT ... */
-  const char *id, *label, *description, *unit;
-  const char* choices;      /* LUMICUT_CHOICE: names separated by '|'; else "" */
-  const char* default_text; /* as lumicut_integrator_set takes it */
-  double minimum, maximum;  /* of numbers */
-} lumicut_param_info;
-enum { LUMICUT_FLOAT = 0, LUMICUT_INT = 1, LUMICUT_BOOL = 2, LUMICUT_CHOICE = 3 };
-
-LUMICUT_API lumicut_result lumicut_get_integrator_info(uint32_t index, lumicut_integrator_info* info); /* [any] INVALID_ARGUMENT past the last */
-LUMICUT_API lumicut_result lumicut_get_param_info(const char* integrator, uint32_t index, lumicut_param_info* info); /* [any] */
 LUMICUT_API lumicut_result lumicut_integrator_create(lumicut_device device, const char* id, lumicut_integrator* integrator); /* [any] */
 LUMICUT_API lumicut_result lumicut_integrator_set(lumicut_integrator integrator, const char* name, const char* value); /* [object] */
 LUMICUT_API const char* lumicut_integrator_get(lumicut_integrator integrator, const char* name); /* [object] NULL: no such parameter */
-
-typedef struct lumicut_vpl {
-  float position[3];  /* oriented, sphere: on its surface; directional: unused */
-  uint32_t kind;      /* LUMICUT_VPL_OMNI ... */
-  float normal[3];    /* unit; oriented, sphere: I falls with max(0, cos); directional: the way light travels; spot: axis */
-  uint32_t group;     /* light group it came from */
-  float intensity[3]; /* W/sr along the normal; directional: irradiance, W/m2 */
-  float cos_outer;    /* spot: falls to 0 at this cosine; sphere: its radius, above 0 */
-  float blend;        /* spot: smoothstep over this much of cosine */
-  float spot_cosine;  /* spot: 1: times the cosine too */
-  float spread_tan;   /* spot: narrowed area lamps fall off with max(0, 1 - spread_tan tan(theta)); 0: no */
-  uint32_t profile;   /* spot: name of a profile that a scene or lights of this process hold, in place of this falloff; then blend,
-                         spot_cosine and spread_tan are its tangent, and intensity is that of its largest value; 0: none */
-} lumicut_vpl;
-enum { LUMICUT_VPL_OMNI = 0, LUMICUT_VPL_ORIENTED = 1, LUMICUT_VPL_DIRECTIONAL = 2, LUMICUT_VPL_SPOT = 3,
-       LUMICUT_VPL_SPHERE = 4 /* an oriented light spread over a ball */ };
-
-/* The host's own VPLs, instead of those traced from the scene; count 0: trace again. */
-LUMICUT_API lumicut_result lumicut_integrator_set_lights(lumicut_integrator integrator, const lumicut_vpl* lights, uint64_t count); /* [object] */
-LUMICUT_API lumicut_result lumicut_integrator_prepare(lumicut_integrator integrator, lumicut_scene scene); /* [object] traces VPLs, builds trees; keeps the scene */
-LUMICUT_API lumicut_result lumicut_integrator_get_lights(lumicut_integrator integrator, const lumicut_vpl** lights, uint64_t* count); /* [object] view, after prepare */
-
-typedef struct lumicut_point { /* a surface point of the host's, 64 bytes */
-  float position[3];
-  uint32_t material;         /* of the scene */
-  float normal[3];           /* shading normal, unit */
-  float u;
-  float geometric_normal[3]; /* unit */
-  float v;
-  float to_viewer[3];        /* unit */
-  uint32_t pixel;            /* points of one pixel lie together; methods that share work within a pixel use it */
-} lumicut_point;
-
-/* Reflected radiance towards the viewer, three floats a point. A pure function of the seed and the input. */
-LUMICUT_API lumicut_result lumicut_integrator_shade(lumicut_integrator integrator, const lumicut_point* points, uint64_t count, float* radiance); /* [shared] after prepare */
 
 /* ---- Level 4, whole frames ---------------------------------------------------------------------------------------- */
 
@@ -372,10 +226,114 @@ typedef struct lumicut_render_desc {
 } lumicut_render_desc;
 enum { LUMICUT_CHECKPOINTS = 1, LUMICUT_ILLUMINANCE = 2, LUMICUT_GROUPS = 4 };
 
+typedef struct lumicut_status {
+  uint32_t struct_size;
+  int32_t state;       /* LUMICUT_IDLE ... */
+  const char* phase;   /* what runs now, such as "light tree"; static string */
+  double fraction;     /* of the phase, 0..1 */
+  double seconds;      /* since the work began */
+  uint64_t tiles_done; /* renders alone */
+  uint64_t tiles_total;
+  uint32_t passes_done;  /* renders alone: whole passes */
+  uint32_t passes_total; /* 0: until stopped */
+  double error;          /* `confidence` of the pixels have a half interval of at most this share of their luminance (of a
+                            tenth of the image's mean where that is larger); infinite before two passes */
+} lumicut_status;
+enum { LUMICUT_IDLE = 0, LUMICUT_RUNNING = 1, LUMICUT_DONE = 2, LUMICUT_STOPPED = 3, LUMICUT_FAILED = 4 };
+
 typedef struct lumicut_tile {
   uint32_t struct_size;
   uint32_t x0, y0, x1, y1;
 } lumicut_tile;
+
+/* Starts in the background: prepares the integrator if need be, renders. Integrator and scene may not change meanwhile. */
+LUMICUT_API lumicut_result lumicut_render_start(lumicut_integrator integrator, lumicut_scene scene, const lumicut_render_desc* desc, lumicut_render* render); /* [object] both */
+LUMICUT_API lumicut_result lumicut_render_wait(lumicut_render render, uint32_t milliseconds, lumicut_status* status); /* [any] returns when done or after that time (0: at once, LUMICUT_FOREVER); a failed render's error comes back here. status may be NULL */
+LUMICUT_API lumicut_result lumicut_render_read(lumicut_render render, const char* channel, const lumicut_tile* rect, float* out); /* [any] rect NULL: the crop; rows packed from the top; tiles not done yet are 0; later passes refine */
+LUMICUT_API lumicut_result lumicut_render_next_tile(lumicut_render render, lumicut_tile* tile); /* [object] finished tiles, each once; x1 = 0: none now */
+/* Light groups that have channels "radiance.GROUP", rising: those of all that emits; empty without LUMICUT_GROUPS. */
+LUMICUT_API lumicut_result lumicut_render_groups(lumicut_render render, const uint32_t** groups, uint64_t* count); /* [any] view */
+/* State after the last whole pass, for lumicut_render_desc.checkpoint; size 0: none yet. */
+LUMICUT_API lumicut_result lumicut_render_checkpoint(lumicut_render render, const void** data, uint64_t* size); /* [object] view */
+
+/* Of accel, scene, integrator or render, while a call of it works in another thread. */
+LUMICUT_API lumicut_result lumicut_get_status(void* handle, lumicut_status* status); /* [any] */
+LUMICUT_API lumicut_result lumicut_cancel(void* handle); /* [any] what runs returns LUMICUT_CANCELLED soon; the object stays usable; idle: nothing */
+LUMICUT_API const char* lumicut_stats_json(void* handle); /* [object] counters and seconds per phase of the last work; view; docs/c_abi.md */
+
+/* ---- More of a scene: textures, measured lamps, an environment, changes ------------------------------------------- */
+
+typedef struct lumicut_texture {
+  uint32_t struct_size;
+  uint32_t width, height;
+  uint32_t channels; /* 1..4 */
+  uint32_t format;   /* LUMICUT_UINT8 (0..255 -> 0..1) or LUMICUT_FLOAT32 */
+  uint32_t flags;    /* LUMICUT_SRGB: decode; LUMICUT_CLAMP: no repeat; LUMICUT_NEAREST: no filter */
+  const void* pixels; /* row 0 is the top row (v = 1), rows packed */
+} lumicut_texture;
+enum { LUMICUT_UINT8 = 0, LUMICUT_FLOAT32 = 1 };
+enum { LUMICUT_SRGB = 1, LUMICUT_CLAMP = 2, LUMICUT_NEAREST = 4 };
+
+/* Intensity by direction, as photometric files have it: bilinear between its angles, 0 beyond the vertical ones. */
+typedef struct lumicut_profile {
+  uint32_t struct_size;
+  uint32_t vertical_count, horizontal_count; /* at least 2; 1 (the same all around) or at least 2 */
+  uint32_t reserved;
+  const float* vertical;   /* radians from the light's direction, rising within 0..pi */
+  const float* horizontal; /* radians about it, rising from 0 to 2 pi; from tangent towards tangent x direction */
+  const float* values;     /* W/sr, vertical_count for each horizontal angle */
+} lumicut_profile;
+
+typedef struct lumicut_environment {
+  uint32_t struct_size;
+  uint32_t group;
+  float color[3];       /* radiance, multiplies the texture */
+  int32_t texture;      /* 1 + index, latitude-longitude; 0: constant */
+  float world_to_map[9]; /* row-major rotation; all 0: identity. In map space z is up: u = 1/2 - atan2(y,x)/2pi,
+                            v = 1/2 + atan2(z,hypot(x,y))/pi */
+  uint32_t flags;       /* LUMICUT_HIDDEN: it lights the scene, but camera rays that leave it bring black */
+} lumicut_environment;
+enum { LUMICUT_HIDDEN = 1 };
+
+LUMICUT_API lumicut_result lumicut_scene_set_textures(lumicut_scene scene, const lumicut_texture* textures, uint64_t count);
+LUMICUT_API lumicut_result lumicut_scene_set_profiles(lumicut_scene scene, const lumicut_profile* profiles, uint64_t count); /* for lights set after; lights keep theirs */
+LUMICUT_API lumicut_result lumicut_scene_set_environment(lumicut_scene scene, const lumicut_environment* environment); /* NULL: black */
+/* New positions of the same topology (and normals, or NULL), new transforms (count as before, or NULL: unchanged). */
+LUMICUT_API lumicut_result lumicut_scene_update_mesh(lumicut_scene scene, uint32_t id, const float* positions, const float* normals, const float* transforms);
+
+/* ---- What the library offers: integrators, their parameters, channels, extensions --------------------------------- */
+
+typedef struct lumicut_integrator_info {
+  uint32_t struct_size;
+  uint32_t param_count;
+  const char *id, *label, *description, *source; /* source: the paper */
+  uint32_t traits;      /* LUMICUT_VIRTUAL_LIGHTS ...; 0: a library before 1.4, which does not tell; every integrator has one */
+  uint32_t reserved;
+  /* Suggested parameters by purpose, "name=value name=value"; "": no suggestion, NULL: before 1.4. Others keep their defaults. */
+  const char* interactive; /* coarse pictures while a view moves */
+  const char* preview;     /* small pictures within a second */
+  const char* draft;       /* a first look at a frame */
+  const char* good;        /* most frames */
+  const char* reference;   /* what others are measured against, in many passes */
+} lumicut_integrator_info;
+enum {
+  LUMICUT_VIRTUAL_LIGHTS = 1,   /* shades by virtual lights: has their parameters, and lights to get and set */
+  LUMICUT_LIGHT_GROUPS = 2,     /* takes LUMICUT_GROUPS; without it a render with that flag is refused */
+  LUMICUT_COMPENSATION = 4,     /* "compensate" brings back what the clamp takes */
+  LUMICUT_SAVED_STATE = 8,      /* lumicut_state.h saves and loads what it prepared */
+  LUMICUT_VIEW_INDEPENDENT = 16, /* another camera repeats no preparation: nothing is clustered by what is seen */
+  LUMICUT_ALL_LIGHTS = 32       /* sums every virtual light at every point: no error of clustering */
+};
+
+typedef struct lumicut_param_info {
+  uint32_t struct_size;
+  uint32_t type; /* LUMICUT_FLOAT ... */
+  const char *id, *label, *description, *unit;
+  const char* choices;      /* LUMICUT_CHOICE: names separated by '|'; else "" */
+  const char* default_text; /* as lumicut_integrator_set takes it */
+  double minimum, maximum;  /* of numbers */
+} lumicut_param_info;
+enum { LUMICUT_FLOAT = 0, LUMICUT_INT = 1, LUMICUT_BOOL = 2, LUMICUT_CHOICE = 3 };
 
 typedef struct lumicut_channel_info {
   uint32_t struct_size;
@@ -383,16 +341,112 @@ typedef struct lumicut_channel_info {
   const char *name, *description;
 } lumicut_channel_info;
 
+LUMICUT_API lumicut_result lumicut_get_integrator_info(uint32_t index, lumicut_integrator_info* info); /* [any] INVALID_ARGUMENT past the last */
+LUMICUT_API lumicut_result lumicut_get_param_info(const char* integrator, uint32_t index, lumicut_param_info* info); /* [any] */
 LUMICUT_API lumicut_result lumicut_get_channel_info(uint32_t index, lumicut_channel_info* info); /* [any] "radiance", "alpha", "depth" ... */
-/* Starts in the background: prepares the integrator if need be, renders. Integrator and scene may not change meanwhile. */
-LUMICUT_API lumicut_result lumicut_render_start(lumicut_integrator integrator, lumicut_scene scene, const lumicut_render_desc* desc, lumicut_render* render); /* [object] both */
-LUMICUT_API lumicut_result lumicut_render_wait(lumicut_render render, uint32_t milliseconds, lumicut_status* status); /* [any] returns when done or after that time (0: at once, LUMICUT_FOREVER); a failed render's error comes back here. status may be NULL */
-LUMICUT_API lumicut_result lumicut_render_next_tile(lumicut_render render, lumicut_tile* tile); /* [object] finished tiles, each once; x1 = 0: none now */
-LUMICUT_API lumicut_result lumicut_render_read(lumicut_render render, const char* channel, const lumicut_tile* rect, float* out); /* [any] rect NULL: the crop; rows packed from the top; tiles not done yet are 0; later passes refine */
-/* Light groups that have channels "radiance.GROUP", rising: those of all that emits; empty without LUMICUT_GROUPS. */
-LUMICUT_API lumicut_result lumicut_render_groups(lumicut_render render, const uint32_t** groups, uint64_t* count); /* [any] view */
-/* State after the last whole pass, for lumicut_render_desc.checkpoint; size 0: none yet. */
-LUMICUT_API lumicut_result lumicut_render_checkpoint(lumicut_render render, const void** data, uint64_t* size); /* [object] view */
+LUMICUT_API const void* lumicut_get_extension(const char* id); /* [any] table of an optional extension, NULL if absent */
+
+/* ---- Level 3 with the host's own points: virtual lights in and out, shading --------------------------------------- */
+
+typedef struct lumicut_vpl {
+  float position[3];  /* oriented, sphere: on its surface; directional: unused */
+  uint32_t kind;      /* LUMICUT_VPL_OMNI ... */
+  float normal[3];    /* unit; oriented, sphere: I falls with max(0, cos); directional: the way light travels; spot: axis */
+  uint32_t group;     /* light group it came from */
+  float intensity[3]; /* W/sr along the normal; directional: irradiance, W/m2 */
+  float cos_outer;    /* spot: falls to 0 at this cosine; sphere: its radius, above 0 */
+  float blend;        /* spot: smoothstep over this much of cosine */
+  float spot_cosine;  /* spot: 1: times the cosine too */
+  float spread_tan;   /* spot: narrowed area lamps fall off with max(0, 1 - spread_tan tan(theta)); 0: no */
+  uint32_t profile;   /* spot: name of a profile that a scene or lights of this process hold, in place of this falloff; then blend,
+                         spot_cosine and spread_tan are its tangent, and intensity is that of its largest value; 0: none */
+} lumicut_vpl;
+enum { LUMICUT_VPL_OMNI = 0, LUMICUT_VPL_ORIENTED = 1, LUMICUT_VPL_DIRECTIONAL = 2, LUMICUT_VPL_SPOT = 3,
+       LUMICUT_VPL_SPHERE = 4 /* an oriented light spread over a ball */ };
+
+typedef struct lumicut_point { /* a surface point of the host's, 64 bytes */
+  float position[3];
+  uint32_t material;         /* of the scene */
+  float normal[3];           /* shading normal, unit */
+  float u;
+  float geometric_normal[3]; /* unit */
+  float v;
+  float to_viewer[3];        /* unit */
+  uint32_t pixel;            /* points of one pixel lie together; methods that share work within a pixel use it */
+} lumicut_point;
+
+/* The host's own VPLs, instead of those traced from the scene; count 0: trace again. */
+LUMICUT_API lumicut_result lumicut_integrator_set_lights(lumicut_integrator integrator, const lumicut_vpl* lights, uint64_t count); /* [object] */
+LUMICUT_API lumicut_result lumicut_integrator_prepare(lumicut_integrator integrator, lumicut_scene scene); /* [object] traces VPLs, builds trees; keeps the scene */
+LUMICUT_API lumicut_result lumicut_integrator_get_lights(lumicut_integrator integrator, const lumicut_vpl** lights, uint64_t* count); /* [object] view, after prepare */
+/* Reflected radiance towards the viewer, three floats a point. A pure function of the seed and the input. */
+LUMICUT_API lumicut_result lumicut_integrator_shade(lumicut_integrator integrator, const lumicut_point* points, uint64_t count, float* radiance); /* [shared] after prepare */
+
+/* ---- Level 1, rays: the host's tracer for a scene, and accel, rays against triangles or boxes --------------------- */
+
+/* Fields are Embree's, in Embree's order. */
+typedef struct lumicut_ray {
+  float org_x, org_y, org_z, tnear, dir_x, dir_y, dir_z, time, tfar;
+  uint32_t mask, id, flags;
+} lumicut_ray;
+typedef struct lumicut_hit {
+  float ng_x, ng_y, ng_z, u, v;
+  uint32_t prim_id, geom_id, inst_id; /* geom_id is LUMICUT_NO_ID where nothing was hit */
+} lumicut_hit;
+typedef struct lumicut_rayhit {
+  lumicut_ray ray;
+  lumicut_hit hit;
+} lumicut_rayhit;
+
+/* The host's own tracer, in batches: fill hits (closest) / set tfar = -inf (occluded). geom_id is the mesh's id, inst_id the
+   index of its transform. */
+typedef struct lumicut_trace {
+  uint32_t struct_size;
+  uint32_t batch; /* most rays a call; 0: 65536 */
+  void (*intersect)(void* user, lumicut_rayhit* rays, uint64_t count);
+  void (*occluded)(void* user, lumicut_ray* rays, uint64_t count);
+  void* user;
+} lumicut_trace;
+
+typedef struct lumicut_accel_desc {
+  uint32_t struct_size;
+  uint32_t robust;         /* LUMICUT_ROBUST (default, also 0) or LUMICUT_FAST */
+  const char* kind;        /* "bvh" (default), the library's own ("agglomerative" is its name of before 1.3), or "embree" */
+  const char* builder;     /* "bvh" alone: see docs/embree_dropin.md; NULL: the default */
+  const float* positions;  /* xyz */
+  uint64_t position_count;
+  uint64_t position_stride; /* bytes; 0: 12 */
+  const uint32_t* indices; /* three a triangle */
+  uint64_t triangle_count;
+  const float* boxes;      /* instead of triangles: six floats a box, lower and upper corner; rays hit the boxes themselves */
+  uint64_t box_count;
+} lumicut_accel_desc;
+enum { LUMICUT_ROBUST = 1, LUMICUT_FAST = 2 }; /* watertight on shared edges; a little faster: some rays slip through them */
+
+typedef struct lumicut_accel_info {
+  uint32_t struct_size;
+  uint32_t node_count;    /* of the binary tree that lumicut_accel_get_node shows; 0: the kind does not show it */
+  uint64_t primitive_count, bytes;
+  double build_seconds;
+  double expected_boxes, expected_primitives, expected_cost; /* Walter et al. 2008, Fig. 6 */
+  float lower[3], upper[3];
+} lumicut_accel_info;
+
+typedef struct lumicut_accel_node_info {
+  uint32_t struct_size;
+  uint32_t left, right;    /* children; LUMICUT_NO_ID in a leaf. Node 0 is the root */
+  uint32_t first, count;   /* a leaf's primitives: lumicut_accel_get_primitives' order */
+  float lower[3], upper[3];
+} lumicut_accel_node_info;
+
+LUMICUT_API lumicut_result lumicut_scene_set_trace(lumicut_scene scene, const lumicut_trace* trace); /* NULL: ours again */
+
+LUMICUT_API lumicut_result lumicut_accel_build(lumicut_device device, const lumicut_accel_desc* desc, lumicut_accel* accel); /* [any] */
+LUMICUT_API lumicut_result lumicut_accel_get_info(lumicut_accel accel, lumicut_accel_info* info); /* [shared] */
+LUMICUT_API lumicut_result lumicut_accel_get_node(lumicut_accel accel, uint32_t index, lumicut_accel_node_info* node); /* [shared] */
+LUMICUT_API lumicut_result lumicut_accel_get_primitives(lumicut_accel accel, const uint32_t** ids, uint64_t* count); /* [shared] view: leaf order -> primitive */
+LUMICUT_API lumicut_result lumicut_accel_intersect(lumicut_accel accel, lumicut_rayhit* rays, uint64_t count); /* [shared] closest hits */
+LUMICUT_API lumicut_result lumicut_accel_occluded(lumicut_accel accel, lumicut_ray* rays, uint64_t count); /* [shared] tfar = -inf where hit */
 
 #ifdef __cplusplus
 }

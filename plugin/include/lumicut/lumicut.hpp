@@ -1,18 +1,56 @@
-// Lumicut for C++17 hosts: lumicut.h with counted handles and exceptions, nothing more.
+// Lumicut for C++17 hosts: all of lumicut.h with counted handles, exceptions and arrays that know their length.
+//
 // Handles are values: copying one shares the object, the last one gone releases it. A null handle throws when it is
 // used. Ownership, threads, spaces and units are those of lumicut.h.
+//
+// Functions come from a table. A program that links the library passes none and gets linked(); one that loads it makes
+// a table with load() and passes it to Device, which hands it on to what is made from it. The table outlives them all.
 #ifndef LUMICUT_HPP
 #define LUMICUT_HPP
 
+#include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "lumicut.h"
 
+// Every function of lumicut.h, without "lumicut_".
+// clang-format off
+#define LUMICUT_FOR_ALL_FUNCTIONS(X)                                                                                   \
+  X(version) X(last_error) X(device_create) X(retain) X(release)                                                       \
+  X(scene_create) X(scene_set_materials) X(scene_add_mesh) X(scene_set_lights) X(scene_set_camera) X(scene_commit)     \
+  X(integrator_create) X(integrator_set) X(integrator_get)                                                             \
+  X(render_start) X(render_wait) X(render_read) X(render_next_tile) X(render_groups) X(render_checkpoint)              \
+  X(get_status) X(cancel) X(stats_json)                                                                                \
+  X(scene_set_textures) X(scene_set_profiles) X(scene_set_environment) X(scene_update_mesh)                            \
+  X(get_integrator_info) X(get_param_info) X(get_channel_info) X(get_extension)                                        \
+  X(integrator_set_lights) X(integrator_prepare) X(integrator_get_lights) X(integrator_shade)                          \
+  X(scene_set_trace) X(accel_build) X(accel_get_info) X(accel_get_node) X(accel_get_primitives) X(accel_intersect)     \
+  X(accel_occluded)
+// clang-format on
+
 namespace lumicut::api {
+
+// ---- Functions and errors ------------------------------------------------------------------------------------------
+
+struct Functions {
+#define LUMICUT_MEMBER(name) decltype(&lumicut_##name) name = nullptr;
+  LUMICUT_FOR_ALL_FUNCTIONS(LUMICUT_MEMBER)
+#undef LUMICUT_MEMBER
+};
+
+// Of the library that the program links. Needs it only where it is called.
+inline const Functions& linked() {
+#define LUMICUT_ADDRESS(name) &lumicut_##name,
+  static const Functions functions = {LUMICUT_FOR_ALL_FUNCTIONS(LUMICUT_ADDRESS)};
+#undef LUMICUT_ADDRESS
+  return functions;
+}
 
 class Exception : public std::runtime_error {
  public:
@@ -23,9 +61,38 @@ class Exception : public std::runtime_error {
   lumicut_result code_;
 };
 
-inline void check(lumicut_result result) {
-  if (result != LUMICUT_OK) throw Exception(result, lumicut_last_error());
+// Throws Exception with the library's text, after "<doing>: " where that is given.
+inline void check(const Functions& f, lumicut_result result, const std::string& doing = {}) {
+  if (result == LUMICUT_OK) return;
+  const char* text = f.last_error();
+  std::string all = text != nullptr && *text != 0 ? text : "failed with code " + std::to_string(result);
+  if (!doing.empty()) all.insert(0, doing + ": ");
+  throw Exception(result, all);
 }
+inline void check(lumicut_result result) { check(linked(), result); }
+
+// The table of a library that is loaded. `find` is called with a function's whole name and gives its address, as dlsym
+// and GetProcAddress do. Throws Exception(LUMICUT_UNSUPPORTED) where the library lacks a function or has another
+// LUMICUT_ABI_MAJOR.
+template <typename Find>
+Functions load(Find&& find) {
+  Functions f;
+  const auto need = [&](auto& function, const char* name) {
+    function = reinterpret_cast<std::remove_reference_t<decltype(function)>>(find(name));
+    if (function == nullptr) throw Exception(LUMICUT_UNSUPPORTED, std::string("lacks the function ") + name);
+  };
+#define LUMICUT_LOAD(name) need(f.name, "lumicut_" #name);
+  LUMICUT_FOR_ALL_FUNCTIONS(LUMICUT_LOAD)
+#undef LUMICUT_LOAD
+  uint32_t major = 0, minor = 0;
+  f.version(&major, &minor);
+  if (major != LUMICUT_ABI_MAJOR)
+    throw Exception(LUMICUT_UNSUPPORTED, "has version " + std::to_string(major) + "." + std::to_string(minor) +
+                                             " of the ABI; " + std::to_string(LUMICUT_ABI_MAJOR) + " is needed");
+  return f;
+}
+
+// ---- Values --------------------------------------------------------------------------------------------------------
 
 // A descriptor of defaults: make<lumicut_material>().
 template <typename T>
@@ -35,162 +102,277 @@ T make() {
   return t;
 }
 
+// An array that belongs to somebody else: made from what has data() and size(), from {a, b}, or from an array.
+template <typename T>
+class Span {
+ public:
+  constexpr Span() = default;
+  constexpr Span(T* data, size_t size) : data_(data), size_(size) {}
+  template <size_t N>
+  constexpr Span(T (&array)[N]) : data_(array), size_(N) {}
+  template <typename U, typename = std::enable_if_t<std::is_same_v<const U, T>>>
+  constexpr Span(std::initializer_list<U> list) : Span(list.begin(), list.size()) {}
+  template <typename C, typename P = decltype(std::declval<C&>().data()),
+            typename = decltype(std::declval<C&>().size()),
+            typename = std::enable_if_t<std::is_convertible_v<std::remove_pointer_t<P> (*)[], T (*)[]>>>
+  constexpr Span(C&& container) : data_(container.data()), size_(container.size()) {}
+
+  constexpr T* data() const { return data_; }
+  constexpr size_t size() const { return size_; }
+  constexpr bool empty() const { return size_ == 0; }
+  constexpr T* begin() const { return data_; }
+  constexpr T* end() const { return data_ + size_; }
+  constexpr T& operator[](size_t i) const { return data_[i]; }
+
+ private:
+  T* data_ = nullptr;
+  size_t size_ = 0;
+};
+
+struct Version {
+  std::string text;  // "1.0.0"
+  uint32_t abi_major = 0, abi_minor = 0;
+};
+
+inline Version version(const Functions& f = linked()) {
+  Version v;
+  v.text = f.version(&v.abi_major, &v.abi_minor);
+  return v;
+}
+
+// ---- What the library offers ---------------------------------------------------------------------------------------
+
+// The texts last as long as the library.
+inline std::vector<lumicut_integrator_info> integrators(const Functions& f = linked()) {
+  std::vector<lumicut_integrator_info> all;
+  for (auto info = make<lumicut_integrator_info>();
+       f.get_integrator_info(static_cast<uint32_t>(all.size()), &info) == LUMICUT_OK;)
+    all.push_back(info);
+  return all;
+}
+
+inline std::vector<lumicut_param_info> params(const std::string& integrator, const Functions& f = linked()) {
+  std::vector<lumicut_param_info> all;
+  for (auto info = make<lumicut_param_info>();
+       f.get_param_info(integrator.c_str(), static_cast<uint32_t>(all.size()), &info) == LUMICUT_OK;)
+    all.push_back(info);
+  return all;
+}
+
+inline std::vector<lumicut_channel_info> channels(const Functions& f = linked()) {
+  std::vector<lumicut_channel_info> all;
+  for (auto info = make<lumicut_channel_info>();
+       f.get_channel_info(static_cast<uint32_t>(all.size()), &info) == LUMICUT_OK;)
+    all.push_back(info);
+  return all;
+}
+
+// nullptr: the library has no such extension. T is its table: lumicut_state_extension.
+template <typename T>
+const T* extension(const char* id, const Functions& f = linked()) {
+  return static_cast<const T*>(f.get_extension(id));
+}
+
+// ---- Handles -------------------------------------------------------------------------------------------------------
+
 template <typename H>
 class Handle {
  public:
   Handle() = default;
-  explicit Handle(H owned) : handle_(owned) {}
-  Handle(const Handle& o) : handle_(o.handle_) {
-    if (handle_ != nullptr) lumicut_retain(handle_);
+  explicit Handle(const Functions& f) : functions_(&f) {}  // null, to be filled through out()
+  explicit Handle(H owned, const Functions& f = linked()) : functions_(&f), handle_(owned) {}
+  Handle(const Handle& o) : functions_(o.functions_), handle_(o.handle_) {
+    if (handle_ != nullptr) functions_->retain(handle_);
   }
-  Handle(Handle&& o) noexcept : handle_(std::exchange(o.handle_, nullptr)) {}
+  Handle(Handle&& o) noexcept : functions_(o.functions_), handle_(std::exchange(o.handle_, nullptr)) {}
   Handle& operator=(Handle o) noexcept {
+    std::swap(functions_, o.functions_);
     std::swap(handle_, o.handle_);
     return *this;
   }
-  ~Handle() { lumicut_release(handle_); }
+  ~Handle() { reset(); }
 
   H get() const { return handle_; }
   explicit operator bool() const { return handle_ != nullptr; }
+  void reset() {
+    if (handle_ != nullptr) functions_->release(std::exchange(handle_, nullptr));
+  }
+  // For a function of lumicut.h that creates. Releases what was held.
+  H* out() {
+    reset();
+    return &handle_;
+  }
+  // Throws where the handle is null.
+  const Functions& functions() const {
+    if (functions_ == nullptr || handle_ == nullptr) throw Exception(LUMICUT_INVALID_ARGUMENT, "handle: is NULL");
+    return *functions_;
+  }
 
   lumicut_status status() const {
     auto s = make<lumicut_status>();
-    check(lumicut_get_status(handle_, &s));
+    check(functions(), functions().get_status(handle_, &s));
     return s;
   }
-  void cancel() const { check(lumicut_cancel(handle_)); }
+  void cancel() const { check(functions(), functions().cancel(handle_)); }
   std::string stats_json() const {
-    const char* text = lumicut_stats_json(handle_);
-    if (text == nullptr) throw Exception(LUMICUT_INVALID_ARGUMENT, lumicut_last_error());
+    const char* text = functions().stats_json(handle_);
+    if (text == nullptr) throw Exception(LUMICUT_INVALID_ARGUMENT, functions().last_error());
     return text;
   }
 
  private:
+  const Functions* functions_ = nullptr;
   H handle_ = nullptr;
 };
 
 class Device : public Handle<lumicut_device> {
  public:
-  explicit Device(int threads = 0, void (*log)(void*, int32_t, const char*) = nullptr, void* user = nullptr,
-                  int verbosity = 1)
-      : Handle(create(threads, log, user, verbosity)) {}
+  using Log = void (*)(void* user, int32_t level, const char* text);
 
- private:
-  static lumicut_device create(int threads, void (*log)(void*, int32_t, const char*), void* user, int verbosity) {
+  explicit Device(int threads = 0, Log log = nullptr, void* user = nullptr, int verbosity = 1)
+      : Device(linked(), threads, log, user, verbosity) {}
+  explicit Device(const Functions& f, int threads = 0, Log log = nullptr, void* user = nullptr, int verbosity = 1)
+      : Handle(f) {
     auto desc = make<lumicut_device_desc>();
     desc.abi_major = LUMICUT_ABI_MAJOR;
     desc.threads = threads;
     desc.verbosity = verbosity;
     desc.log = log;
     desc.user = user;
-    lumicut_device device = nullptr;
-    check(lumicut_device_create(&desc, &device));
-    return device;
+    check(f, f.device_create(&desc, out()));
   }
 };
 
 class Accel : public Handle<lumicut_accel> {
  public:
-  Accel(const Device& device, const lumicut_accel_desc& desc) : Handle(build(device, desc)) {}
+  Accel(const Device& device, const lumicut_accel_desc& desc) : Handle(device.functions()) {
+    const Functions& f = device.functions();
+    check(f, f.accel_build(device.get(), &desc, out()));
+  }
 
   lumicut_accel_info info() const {
     auto i = make<lumicut_accel_info>();
-    check(lumicut_accel_get_info(get(), &i));
+    check(functions(), functions().accel_get_info(get(), &i));
     return i;
   }
   lumicut_accel_node_info node(uint32_t index) const {
     auto n = make<lumicut_accel_node_info>();
-    check(lumicut_accel_get_node(get(), index, &n));
+    check(functions(), functions().accel_get_node(get(), index, &n));
     return n;
   }
-  void intersect(lumicut_rayhit* rays, uint64_t count) const { check(lumicut_accel_intersect(get(), rays, count)); }
-  void occluded(lumicut_ray* rays, uint64_t count) const { check(lumicut_accel_occluded(get(), rays, count)); }
-
- private:
-  static lumicut_accel build(const Device& device, const lumicut_accel_desc& desc) {
-    lumicut_accel accel = nullptr;
-    check(lumicut_accel_build(device.get(), &desc, &accel));
-    return accel;
+  // Leaf order -> primitive. Lasts as long as the accel.
+  Span<const uint32_t> primitives() const {
+    const uint32_t* ids = nullptr;
+    uint64_t count = 0;
+    check(functions(), functions().accel_get_primitives(get(), &ids, &count));
+    return {ids, static_cast<size_t>(count)};
   }
+  void intersect(Span<lumicut_rayhit> rays) const {
+    check(functions(), functions().accel_intersect(get(), rays.data(), rays.size()));
+  }
+  void intersect(lumicut_rayhit* rays, uint64_t count) const { intersect({rays, static_cast<size_t>(count)}); }
+  void occluded(Span<lumicut_ray> rays) const {
+    check(functions(), functions().accel_occluded(get(), rays.data(), rays.size()));
+  }
+  void occluded(lumicut_ray* rays, uint64_t count) const { occluded({rays, static_cast<size_t>(count)}); }
 };
 
 class Scene : public Handle<lumicut_scene> {
  public:
   explicit Scene(const Device& device, const char* accel = nullptr, bool robust = true, const char* builder = nullptr)
-      : Handle(create(device, accel, robust, builder)) {}
-
-  void set_textures(const std::vector<lumicut_texture>& t) {
-    check(lumicut_scene_set_textures(get(), t.data(), t.size()));
-  }
-  void set_materials(const std::vector<lumicut_material>& m) {
-    check(lumicut_scene_set_materials(get(), m.data(), m.size()));
-  }
-  uint32_t add_mesh(const lumicut_mesh& mesh) {
-    uint32_t id = 0;
-    check(lumicut_scene_add_mesh(get(), &mesh, &id));
-    return id;
-  }
-  void update_mesh(uint32_t id, const float* positions, const float* normals, const float* transforms) {
-    check(lumicut_scene_update_mesh(get(), id, positions, normals, transforms));
-  }
-  void set_lights(const std::vector<lumicut_light>& l) { check(lumicut_scene_set_lights(get(), l.data(), l.size())); }
-  void set_profiles(const std::vector<lumicut_profile>& p) {
-    check(lumicut_scene_set_profiles(get(), p.data(), p.size()));
-  }
-  void set_environment(const lumicut_environment& e) { check(lumicut_scene_set_environment(get(), &e)); }
-  void clear_environment() { check(lumicut_scene_set_environment(get(), nullptr)); }
-  void set_camera(const lumicut_camera& camera) { check(lumicut_scene_set_camera(get(), &camera)); }
-  void set_trace(const lumicut_trace& trace) { check(lumicut_scene_set_trace(get(), &trace)); }
-  void clear_trace() { check(lumicut_scene_set_trace(get(), nullptr)); }
-  void commit() { check(lumicut_scene_commit(get())); }
-
- private:
-  static lumicut_scene create(const Device& device, const char* accel, bool robust, const char* builder) {
+      : Handle(device.functions()) {
     auto desc = make<lumicut_scene_desc>();
     desc.robust = robust ? LUMICUT_ROBUST : LUMICUT_FAST;
     desc.accel = accel;
     desc.builder = builder;
-    lumicut_scene scene = nullptr;
-    check(lumicut_scene_create(device.get(), &desc, &scene));
-    return scene;
+    const Functions& f = device.functions();
+    check(f, f.scene_create(device.get(), &desc, out()));
   }
+
+  void set_textures(Span<const lumicut_texture> t) {
+    check(functions(), functions().scene_set_textures(get(), t.data(), t.size()));
+  }
+  void set_materials(Span<const lumicut_material> m) {
+    check(functions(), functions().scene_set_materials(get(), m.data(), m.size()));
+  }
+  uint32_t add_mesh(const lumicut_mesh& mesh) {
+    uint32_t id = 0;
+    check(functions(), functions().scene_add_mesh(get(), &mesh, &id));
+    return id;
+  }
+  void update_mesh(uint32_t id, const float* positions, const float* normals, const float* transforms) {
+    check(functions(), functions().scene_update_mesh(get(), id, positions, normals, transforms));
+  }
+  void set_lights(Span<const lumicut_light> l) {
+    check(functions(), functions().scene_set_lights(get(), l.data(), l.size()));
+  }
+  void set_profiles(Span<const lumicut_profile> p) {
+    check(functions(), functions().scene_set_profiles(get(), p.data(), p.size()));
+  }
+  void set_environment(const lumicut_environment& e) {
+    check(functions(), functions().scene_set_environment(get(), &e));
+  }
+  void clear_environment() { check(functions(), functions().scene_set_environment(get(), nullptr)); }
+  void set_camera(const lumicut_camera& camera) { check(functions(), functions().scene_set_camera(get(), &camera)); }
+  void set_trace(const lumicut_trace& trace) { check(functions(), functions().scene_set_trace(get(), &trace)); }
+  void clear_trace() { check(functions(), functions().scene_set_trace(get(), nullptr)); }
+  void commit() { check(functions(), functions().scene_commit(get())); }
 };
 
 class Integrator : public Handle<lumicut_integrator> {
  public:
-  Integrator(const Device& device, const char* id) : Handle(create(device, id)) {}
+  Integrator(const Device& device, const char* id) : Handle(device.functions()) {
+    const Functions& f = device.functions();
+    check(f, f.integrator_create(device.get(), id, out()));
+  }
 
   Integrator& set(const char* name, const std::string& value) {
-    check(lumicut_integrator_set(get(), name, value.c_str()));
+    check(functions(), functions().integrator_set(get(), name, value.c_str()));
+    return *this;
+  }
+  // Of lumicut_integrator_info, such as `good`: "name=value name=value". NULL sets nothing.
+  Integrator& apply(const char* preset) {
+    std::string rest = preset != nullptr ? preset : "";
+    while (!rest.empty()) {
+      const std::string pair = rest.substr(0, rest.find(' '));
+      rest.erase(0, pair.size() + 1);
+      const size_t equals = pair.find('=');
+      if (equals == std::string::npos) throw Exception(LUMICUT_INVALID_ARGUMENT, "preset: \"" + pair + "\" has no =");
+      set(pair.substr(0, equals).c_str(), pair.substr(equals + 1));
+    }
     return *this;
   }
   std::string value(const char* name) const {
-    const char* text = lumicut_integrator_get(get(), name);
-    if (text == nullptr) throw Exception(LUMICUT_INVALID_ARGUMENT, lumicut_last_error());
+    const char* text = functions().integrator_get(get(), name);
+    if (text == nullptr) throw Exception(LUMICUT_INVALID_ARGUMENT, functions().last_error());
     return text;
   }
-  void set_lights(const std::vector<lumicut_vpl>& l) {
-    check(lumicut_integrator_set_lights(get(), l.data(), l.size()));
+  void set_lights(Span<const lumicut_vpl> l) {
+    check(functions(), functions().integrator_set_lights(get(), l.data(), l.size()));
   }
-  void prepare(const Scene& scene) { check(lumicut_integrator_prepare(get(), scene.get())); }
+  void prepare(const Scene& scene) { check(functions(), functions().integrator_prepare(get(), scene.get())); }
   std::vector<lumicut_vpl> lights() const {
+    const Span<const lumicut_vpl> view = lights_view();
+    return {view.begin(), view.end()};
+  }
+  // Lasts until the next call that is not [any].
+  Span<const lumicut_vpl> lights_view() const {
     const lumicut_vpl* view = nullptr;
     uint64_t count = 0;
-    check(lumicut_integrator_get_lights(get(), &view, &count));
-    return {view, view + count};
+    check(functions(), functions().integrator_get_lights(get(), &view, &count));
+    return {view, static_cast<size_t>(count)};
   }
   // Three floats a point.
-  std::vector<float> shade(const std::vector<lumicut_point>& points) const {
+  std::vector<float> shade(Span<const lumicut_point> points) const {
     std::vector<float> radiance(3 * points.size());
-    check(lumicut_integrator_shade(get(), points.data(), points.size(), radiance.data()));
+    shade(points, radiance);
     return radiance;
   }
-
- private:
-  static lumicut_integrator create(const Device& device, const char* id) {
-    lumicut_integrator integrator = nullptr;
-    check(lumicut_integrator_create(device.get(), id, &integrator));
-    return integrator;
+  void shade(Span<const lumicut_point> points, Span<float> radiance) const {
+    if (radiance.size() < 3 * points.size())
+      throw Exception(LUMICUT_INVALID_ARGUMENT, "radiance: has room for " + std::to_string(radiance.size() / 3) +
+                                                    " of " + std::to_string(points.size()) + " points");
+    check(functions(), functions().integrator_shade(get(), points.data(), points.size(), radiance.data()));
   }
 };
 
@@ -198,40 +380,58 @@ class Integrator : public Handle<lumicut_integrator> {
 class Render : public Handle<lumicut_render> {
  public:
   Render(const Integrator& integrator, const Scene& scene, const lumicut_render_desc& desc)
-      : Handle(start(integrator, scene, desc)), desc_(desc) {}
+      : Handle(integrator.functions()), desc_(desc) {
+    const Functions& f = integrator.functions();
+    check(f, f.render_start(integrator.get(), scene.get(), &desc, out()));
+  }
 
   // Throws what made the render fail, also LUMICUT_CANCELLED.
   lumicut_status wait(uint32_t milliseconds = LUMICUT_FOREVER) const {
     auto s = make<lumicut_status>();
-    check(lumicut_render_wait(get(), milliseconds, &s));
+    check(functions(), functions().render_wait(get(), milliseconds, &s));
     return s;
   }
   // False: none now.
   bool next_tile(lumicut_tile& tile) const {
     tile.struct_size = sizeof(tile);
-    check(lumicut_render_next_tile(get(), &tile));
+    check(functions(), functions().render_next_tile(get(), &tile));
     return tile.x1 != 0;
   }
-  // The crop, rows packed from the top.
-  std::vector<float> read(const char* channel) const {
-    const bool whole = desc_.crop[2] == 0;
-    const uint64_t width = whole ? desc_.width : desc_.crop[2] - desc_.crop[0];
-    const uint64_t height = whole ? desc_.height : desc_.crop[3] - desc_.crop[1];
+  // Rows packed from the top; of the crop, or of a part of it.
+  std::vector<float> read(const char* channel) const { return read(channel, crop()); }
+  std::vector<float> read(const char* channel, const lumicut_tile& part) const {
+    const uint64_t width = part.x1 > part.x0 ? part.x1 - part.x0 : 0,
+                   height = part.y1 > part.y0 ? part.y1 - part.y0 : 0;
     std::vector<float> out(width * height * components(channel));
-    check(lumicut_render_read(get(), channel, nullptr, out.data()));
+    check(functions(), functions().render_read(get(), channel, &part, out.data()));
     return out;
+  }
+  // Light groups that have a channel "radiance.GROUP", rising.
+  std::vector<uint32_t> groups() const {
+    const uint32_t* view = nullptr;
+    uint64_t count = 0;
+    check(functions(), functions().render_groups(get(), &view, &count));
+    return {view, view + count};
+  }
+  // For lumicut_render_desc.checkpoint; empty: none yet. Lasts until the next call that is not [any].
+  Span<const unsigned char> checkpoint() const {
+    const void* data = nullptr;
+    uint64_t size = 0;
+    check(functions(), functions().render_checkpoint(get(), &data, &size));
+    return {static_cast<const unsigned char*>(data), static_cast<size_t>(size)};
   }
 
  private:
-  static lumicut_render start(const Integrator& integrator, const Scene& scene, const lumicut_render_desc& desc) {
-    lumicut_render render = nullptr;
-    check(lumicut_render_start(integrator.get(), scene.get(), &desc, &render));
-    return render;
+  lumicut_tile crop() const {
+    auto whole = make<lumicut_tile>();
+    const bool all = desc_.crop[2] == 0;
+    whole.x0 = desc_.crop[0], whole.y0 = desc_.crop[1];
+    whole.x1 = all ? desc_.width : desc_.crop[2], whole.y1 = all ? desc_.height : desc_.crop[3];
+    return whole;
   }
-  // 3 for a name that does not exist: the read that follows says so.
-  static uint64_t components(const std::string& channel) {
-    auto info = make<lumicut_channel_info>();
-    for (uint32_t i = 0; lumicut_get_channel_info(i, &info) == LUMICUT_OK; ++i)
+  // 3 for radiance.GROUP, and for a name that does not exist: the read that follows says so.
+  uint64_t components(const std::string& channel) const {
+    for (const lumicut_channel_info& info : channels(functions()))
       if (channel == info.name) return info.components;
     return 3;
   }

@@ -1,5 +1,6 @@
 /* Extension "lumicut.state/1": what an integrator prepared, as bytes. For methods whose preparation does not depend on the
- * camera and is worth keeping (such as "wspd"): prepare and save once, load in any later run, render any view.
+ * camera and is worth keeping (such as "wspd"; LUMICUT_SAVED_STATE tells which): prepare and save once, load in any later
+ * run, render any view.
  * lumicut_get_extension("lumicut.state/1") gives the table. The rules of lumicut.h hold here too. */
 #ifndef LUMICUT_STATE_H
 #define LUMICUT_STATE_H
