@@ -1,5 +1,5 @@
-// Smoke runs (LUMICUT_BENCH_SMOKE set, by CTest): every part of a benchmark on input that takes about a second in all, so
-// that none breaks unseen. Their figures mean nothing.
+// Smoke runs (CTest sets LUMICUT_BENCH_SMOKE): every part of a benchmark on small input, about a second in all, so
+// that a broken one is noticed. Their figures mean nothing.
 #pragma once
 
 #include <cstdlib>

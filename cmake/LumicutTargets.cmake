@@ -26,9 +26,9 @@ add_library(lumicut_options INTERFACE)
 target_compile_options(lumicut_options INTERFACE -Wall -Wextra -Wshadow -Werror
   $<$<OR:$<C_COMPILER_ID:GNU>,$<CXX_COMPILER_ID:GNU>>:-Wno-restrict>
   $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor -Woverloaded-virtual>)
-# Highway compiles hot loops for a portable fallback, SSE4, AVX2 and AVX-512, and picks one at run time.
+# Highway compiles the hot loops for a portable fallback, SSE4, AVX2 and AVX-512, and picks one at run time.
 set(disabled_targets HWY_SSSE3)
-# Sanitizers: the main list leaves AVX2 alone.
+# With sanitizers only AVX2 remains (see the least set in the main CMakeLists.txt).
 if(LUMICUT_SANITIZE)
   set(disabled_targets "(HWY_SSSE3|HWY_SSE4|HWY_AVX3)")
 endif()
@@ -42,7 +42,7 @@ if(LUMICUT_SANITIZE)
     list(APPEND sanitize -fno-sanitize=null,vptr -fno-sanitize-recover=all)
   endif()
   if(LUMICUT_SANITIZE STREQUAL thread)
-    # oneTBB's calls with their order said.
+    # Wrappers of oneTBB's calls that tell ThreadSanitizer their order.
     list(APPEND sanitize -isystem ${PROJECT_SOURCE_DIR}/tests/tsan
       -fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/tests/tsan/ignored.txt)
   endif()
@@ -50,8 +50,9 @@ if(LUMICUT_SANITIZE)
   target_link_options(lumicut_options INTERFACE ${sanitize})
 endif()
 
-# libFuzzer's edge counts, so that one build serves the sanitized tests and the fuzz targets (tests/fuzz/). Not in the
-# numerical folders: their code does not depend on the form of the input, and counting takes the compiler minutes a file.
+# libFuzzer's edge counts, so that one build serves the sanitized tests and the fuzz targets (tests/fuzz/). The
+# numerical folders go without: their code does not depend on the form of the input, and counting takes minutes of
+# compile time a file.
 function(lumicut_count_edges target)
   if(LUMICUT_FUZZ AND NOT target MATCHES "accel|clusters|integrators")
     target_compile_options(${target} PRIVATE -fsanitize=fuzzer-no-link)
@@ -94,7 +95,7 @@ endfunction()
 # The tests of `name` that match `filter` once more on each lesser instruction set. For tests with SIMD code in them.
 function(lumicut_test_instruction_sets name filter)
   if(LUMICUT_SANITIZE)
-    return()  # they have one set alone
+    return()  # their builds have one instruction set only
   endif()
   target_sources(${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests/instruction_set.cpp)
   target_link_libraries(${name} PRIVATE hwy::hwy)

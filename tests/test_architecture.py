@@ -117,7 +117,7 @@ class Version(unittest.TestCase):
         addon = ROOT / "export_scripts/lumicut_blender"
         places = [(addon / "__init__.py", r'"version": \((\d+, \d+, \d+)\)', ", "),
                   (addon / "blender_manifest.toml", r'^version = "(.*)"$', "."),
-                  (ROOT / "plugin/include/lumicut/lumicut.h", r'lumicut_version\(.*/\* \[any\] "([\d.]+)"', "."),
+                  (ROOT / "plugin/include/lumicut/lumicut.h", r'"(\d+\.\d+\.\d+)"', "."),
                   *((page, r"lumicut_blender-([\d.]+)\.zip", ".") for page in (ROOT / "README.md", ROOT / "docs/blender.md"))]
         for path, pattern, separator in places:
             with self.subTest(path=path):
@@ -133,9 +133,10 @@ class Version(unittest.TestCase):
 
     def test_no_other_source_states_it(self):
         written = re.compile(rf'(?<![\d.]){re.escape(self.version)}(?![\d.]*\d)')
-        states = {"CMakeLists.txt", "plugin/include/lumicut/lumicut.h"}
+        states = {"CMakeLists.txt", "plugin/include/lumicut/lumicut.h",
+                  "export_scripts/lumicut_blender/blender_manifest.toml"}
         found = []
-        for path in sorted(p for p in ROOT.rglob("*") if p.suffix in {*SOURCES, ".py", ".txt", ".cmake", ".in", ".sh"}):
+        for path in sorted(p for p in ROOT.rglob("*") if p.suffix in {*SOURCES, ".py", ".toml", ".txt", ".cmake", ".in", ".sh"}):
             name = path.relative_to(ROOT).as_posix()
             if path.is_file() and name.partition("/")[0] not in NOT_SOURCES and name not in states:
                 found += [f"{name}: {line.strip()}" for line in path.read_text().splitlines() if written.search(line)]

@@ -21,7 +21,7 @@ look shellcheck shellcheck "${scripts[@]}"
 [ -z "$failed" ] || { echo "lint: failed:$failed" >&2; exit 1; }
 
 if [ "${1-}" = --tidy ]; then
-  # clang-tidy asks for the compiler's commands and the one header that a build makes.
+  # clang-tidy needs the compile commands and the one generated header.
   configure() { cmake --preset release && cmake --build --preset release --target lumicut_git_version; }
   look configure configure
   [ -n "$failed" ] || look clang-tidy tools/dev/tidy.py build/release
