@@ -130,7 +130,7 @@ class Span {
 };
 
 struct Version {
-  std::string text;  // "1.0.0"
+  std::string text;  // "major.minor.patch"
   uint32_t abi_major = 0, abi_minor = 0;
 };
 
