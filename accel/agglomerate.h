@@ -1,5 +1,5 @@
 // Bottom-up clustering: one core (accel/agglomerate-inl.h), four strategies, one policy per use. [Walter et al. 2008,
-// sec. 3] Here: the plain types, and the two policies of this folder. The light policy lies in clusters/light_policy.h.
+// sec. 3] Here: the plain types, and the two policies of this folder. The light policy lies in clustering/light_policy.h.
 #pragma once
 
 #include <cstddef>

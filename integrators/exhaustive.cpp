@@ -1,5 +1,5 @@
 // The sum over all VPLs at every point: the truth that clustering is measured against. [thesis Eq. 1.1]
-#include "clusters/light_kernel.h"
+#include "clustering/light_kernel.h"
 #include "core/parallel.h"
 #include "integrators/integrator.h"
 

@@ -9,11 +9,11 @@
 #include <memory>
 
 #include "bsdf/point_bsdf.h"
-#include "clusters/bounds.h"
-#include "clusters/light_kernel.h"
-#include "clusters/light_tree.h"
-#include "clusters/pair_bounds.h"
-#include "clusters/point_tree.h"
+#include "clustering/bounds.h"
+#include "clustering/light_kernel.h"
+#include "clustering/light_tree.h"
+#include "clustering/pair_bounds.h"
+#include "clustering/point_tree.h"
 #include "core/parallel.h"
 #include "core/rng.h"
 #include "integrators/integrator.h"

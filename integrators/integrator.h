@@ -10,8 +10,8 @@
 
 #include "core/progress.h"
 #include "core/stats.h"
+#include "lights/vpl.h"
 #include "scene/scene.h"
-#include "vpl/vpl.h"
 
 namespace lumicut {
 

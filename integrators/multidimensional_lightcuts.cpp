@@ -8,10 +8,10 @@
 #include <memory>
 #include <numeric>
 
-#include "clusters/light_kernel.h"
-#include "clusters/light_tree.h"
-#include "clusters/pair_bounds.h"
-#include "clusters/point_tree.h"
+#include "clustering/light_kernel.h"
+#include "clustering/light_tree.h"
+#include "clustering/pair_bounds.h"
+#include "clustering/point_tree.h"
 #include "core/parallel.h"
 #include "core/rng.h"
 #include "integrators/integrator.h"

@@ -2,14 +2,14 @@
 // [Kajiya 1986; multiple importance sampling: Veach, Guibas 1995]
 #include <numbers>
 
-#include "clusters/light_kernel.h"
+#include "clustering/light_kernel.h"
 #include "core/parallel.h"
 #include "core/sampling.h"
 #include "integrators/integrator.h"
-#include "scene/place_rng.h"
+#include "lights/light_sampler.h"
+#include "lights/light_surfaces.h"
+#include "scene/rng_at_point.h"
 #include "scene/scene.h"
-#include "vpl/emitters.h"
-#include "vpl/lamp_surfaces.h"
 
 namespace lumicut {
 
@@ -22,13 +22,13 @@ class PathTracer final : public Integrator {
  public:
   void prepare(const Scene& scene, const VplSet&, const Params& params, ShadeContext context) override {
     scene_ = &scene;
-    emitters_ = std::make_unique<Emitters>(scene, &context.progress);
-    lamps_ = std::make_unique<LampSurfaces>(scene);
+    sampler_ = std::make_unique<LightSampler>(scene, &context.progress);
+    lamps_ = std::make_unique<LightSurfaces>(scene);
     samples_ = static_cast<uint32_t>(params.integer("samples"));
     max_depth_ = static_cast<uint32_t>(params.integer("max_depth"));
     seed_ = static_cast<uint64_t>(params.integer("seed"));
     std::vector<double> power;
-    for (const Vpl& v : emitters_->delta_lights()) power.push_back(luminance(v.intensity));
+    for (const Vpl& v : sampler_->delta_lights()) power.push_back(luminance(v.intensity));
     delta_ = DiscreteDistribution(power);
   }
 
@@ -45,7 +45,7 @@ class PathTracer final : public Integrator {
         if (context.progress.cancelled()) return;
         paths.clear();
         for (size_t i = begin; i < end; ++i)
-          paths.push_back({points.get(i), place_rng(*scene_, points.get(i), hash64(seed_, s), Stage::path),
+          paths.push_back({points.get(i), rng_at_point(*scene_, points.get(i), hash64(seed_, s), Stage::path),
                            static_cast<uint32_t>(i - begin)});
         follow(paths, radiance.subspan(begin, end - begin), rays, context);
       }
@@ -124,12 +124,12 @@ class PathTracer final : public Integrator {
   void sample_lights(Path& path, std::vector<Ray>& rays, std::vector<Shadow>& shadows) const {
     if (!delta_.empty()) {
       const size_t i = delta_.sample(path.rng.next_float());
-      const Vpl& light = emitters_->delta_lights()[i];
+      const Vpl& light = sampler_->delta_lights()[i];
       add_shadow(path, light, light_point(light, light.intensity / static_cast<float>(delta_.pmf(i)), 0.0f, path.point),
                  rays, shadows);
     }
-    if (!emitters_->has_extended() && !emitters_->has_environment()) return;
-    const DirectSample s = emitters_->sample_one(path.rng);
+    if (!sampler_->has_extended() && !sampler_->has_environment()) return;
+    const DirectSample s = sampler_->sample_light(path.rng);
     Rgb light = light_point(s.vpl, s.vpl.intensity, 0.0f, path.point);
     if (!(max_component(light) > 0.0f)) return;
     if (s.seen_by_rays) {
@@ -164,15 +164,15 @@ class PathTracer final : public Integrator {
   bool arrive(Path& path, const RayHit& hit, uint32_t depth, std::span<Rgb> radiance) const {
     Rgb& sum = radiance[path.index];
     if (!lamps_->empty())
-      lamps_->for_each_hit(hit.ray.org, path.direction, hit.ray.tfar, [&](const LampSurfaces::Hit& lamp) {
-        const double density = emitters_->lamp_density(lamp.lamp) * double{lamp.t} * lamp.t / lamp.cosine;
+      lamps_->for_each_hit(hit.ray.org, path.direction, hit.ray.tfar, [&](const LightSurfaces::Hit& lamp) {
+        const double density = sampler_->lamp_density(lamp.lamp) * double{lamp.t} * lamp.t / lamp.cosine;
         sum += path.weight * lamp.radiance * (path.specular ? 1.0f : power_heuristic(path.pdf, density));
       });
     if (hit.hit.geom == kNoId) {
       const Rgb light = scene_->environment_radiance(path.direction);
       if (max_component(light) > 0.0f)
         sum += path.weight * light *
-               (path.specular ? 1.0f : power_heuristic(path.pdf, emitters_->environment_density(path.direction)));
+               (path.specular ? 1.0f : power_heuristic(path.pdf, sampler_->environment_density(path.direction)));
       return false;
     }
     // A ray that meets its own surface at once left it below the horizon of the triangle.
@@ -180,7 +180,7 @@ class PathTracer final : public Integrator {
     const SurfaceInteraction at = scene_->interaction(hit, path.point.pixel);
     if (max_component(at.emitted) > 0.0f) {
       const double cosine = std::max(1e-9f, std::abs(dot(at.geometric_normal, at.to_viewer)));
-      const double density = emitters_->mesh_density(at) * double{at.t} * at.t / cosine;
+      const double density = sampler_->mesh_density(at) * double{at.t} * at.t / cosine;
       sum += path.weight * at.emitted * (path.specular ? 1.0f : power_heuristic(path.pdf, density));
     }
     if (depth >= max_depth_) return false;
@@ -209,8 +209,8 @@ class PathTracer final : public Integrator {
   }
 
   const Scene* scene_ = nullptr;
-  std::unique_ptr<Emitters> emitters_;
-  std::unique_ptr<LampSurfaces> lamps_;
+  std::unique_ptr<LightSampler> sampler_;
+  std::unique_ptr<LightSurfaces> lamps_;
   DiscreteDistribution delta_;
   uint32_t samples_ = 1, max_depth_ = 32;
   uint64_t seed_ = 1;

@@ -2,9 +2,9 @@
 // alike; one light of each cluster renders all points. [Hašan et al. 2007]
 // Departs: rows come from a batch of the frame's points (262,144, or what the host gives), stratified over it; clusters
 // are split across their principal axis. docs/integrators/row_column_sampling.md
-#include "clusters/column_clusters.h"
-#include "clusters/light_matrix.h"
-#include "clusters/light_sum.h"
+#include "clustering/column_clusters.h"
+#include "clustering/light_matrix.h"
+#include "clustering/light_sum.h"
 #include "core/parallel.h"
 #include "core/rng.h"
 #include "integrators/integrator.h"

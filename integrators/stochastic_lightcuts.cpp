@@ -8,13 +8,13 @@
 #include <memory>
 
 #include "bsdf/point_bsdf.h"
-#include "clusters/bounds.h"
-#include "clusters/light_kernel.h"
-#include "clusters/light_tree.h"
+#include "clustering/bounds.h"
+#include "clustering/light_kernel.h"
+#include "clustering/light_tree.h"
 #include "core/parallel.h"
 #include "core/rng.h"
 #include "integrators/integrator.h"
-#include "scene/place_rng.h"
+#include "scene/rng_at_point.h"
 
 namespace lumicut {
 
@@ -133,7 +133,7 @@ class StochasticLightcuts final : public Integrator {
 
   Rgb shade_point(const SurfacePoint& point, const Progress& progress, Workspace& work, PointCounts& c) const {
     work.rays.clear(), work.light.clear();
-    Rng rng = place_rng(*scene_, point, seed_, Stage::representative);
+    Rng rng = rng_at_point(*scene_, point, seed_, Stage::representative);
     uint32_t steps = 0;
     for (const CutNode& cut : work.heap) {
       if (steps++ % 1024 == 0 && progress.cancelled()) break;

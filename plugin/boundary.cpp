@@ -104,7 +104,7 @@ void fail_handle_kind(HandleKind is, HandleKind expected) {
   fail_argument(std::string(handle_name(expected)) + ": the handle is a " + handle_name(is));
 }
 
-Gate::Hold Gate::read(const char* user) {
+AccessGuard::Hold AccessGuard::read(const char* user) {
   int64_t users = users_.load(std::memory_order_relaxed);
   do {
     if (users >= kWriter) refuse();
@@ -113,14 +113,14 @@ Gate::Hold Gate::read(const char* user) {
   return {this, 1};
 }
 
-Gate::Hold Gate::change(const char* user) {
+AccessGuard::Hold AccessGuard::change(const char* user) {
   int64_t nobody = 0;
   if (!users_.compare_exchange_strong(nobody, kWriter, std::memory_order_acquire, std::memory_order_relaxed)) refuse();
   last_user_.store(user, std::memory_order_relaxed);
   return {this, kWriter};
 }
 
-void Gate::refuse() const {
+void AccessGuard::refuse() const {
   fail_state(std::string(handle_name(kind_)) + ": in use by " + last_user_.load(std::memory_order_relaxed) +
              ", which must end first");
 }

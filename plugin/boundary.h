@@ -1,7 +1,7 @@
 // The border of the library: nothing thrown inside passes it, and nothing a host hands over is trusted before it did.
 //   guard          exceptions → code and this thread's text
 //   Object, Ref    counted handles that know their kind
-//   Gate           who may use an object now, and why not
+//   AccessGuard           who may use an object now, and why not
 //   read, write    descriptors of any struct_size (the growth rule in lumicut.h)
 #pragma once
 
@@ -110,9 +110,9 @@ class Ref {
 
 // Many readers or one writer. Never waits: what does not fit now is refused with the reason, so that a host's mistake
 // in ordering its calls is an error, not a race.
-class Gate {
+class AccessGuard {
  public:
-  explicit Gate(HandleKind kind) : kind_(kind) {}
+  explicit AccessGuard(HandleKind kind) : kind_(kind) {}
 
   class Hold {
    public:
@@ -129,9 +129,9 @@ class Gate {
     }
 
    private:
-    friend class Gate;
-    Hold(Gate* gate, int64_t by) : gate_(gate), by_(by) {}
-    Gate* gate_ = nullptr;
+    friend class AccessGuard;
+    Hold(AccessGuard* gate, int64_t by) : gate_(gate), by_(by) {}
+    AccessGuard* gate_ = nullptr;
     int64_t by_ = 0;
   };
 

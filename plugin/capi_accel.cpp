@@ -17,13 +17,13 @@ static_assert(sizeof(lumicut_rayhit) == sizeof(RayHit) && offsetof(lumicut_rayhi
 
 namespace {
 
-void check_array(const Checked& c, const char* name, const void* array, const char* count_name, uint64_t count) {
+void check_array(const FieldValidator& c, const char* name, const void* array, const char* count_name, uint64_t count) {
   c.integer(count_name, count, 0, 0xfffffffeu);
   if (count > 0 && array == nullptr)
     c.fail(name, std::string("is NULL, but ") + count_name + " is " + number_text(count));
 }
 
-void copy_triangles(const lumicut_accel_desc& in, const Checked& c, lumicut_accel_t& accel) {
+void copy_triangles(const lumicut_accel_desc& in, const FieldValidator& c, lumicut_accel_t& accel) {
   const uint64_t stride = in.position_stride == 0 ? 12 : in.position_stride;
   if (stride < 12 || stride > 4096) c.fail("position_stride", number_text(stride) + " is neither 0 nor in [12, 4096]");
   accel.positions.resize(in.position_count);
@@ -66,7 +66,7 @@ lumicut_result lumicut_accel_build(lumicut_device device, const lumicut_accel_de
   return guard([&] {
     lumicut_device_t& d = object(device);
     const lumicut_accel_desc in = read(desc);
-    const Checked c("lumicut_accel_desc");
+    const FieldValidator c("lumicut_accel_desc");
     if (accel == nullptr) fail_argument("lumicut_accel_build: accel is NULL");
     const Scene::Config config = to_accel("lumicut_accel_desc", in.robust, in.kind, in.builder);
     const std::string& kind = config.accel;

@@ -26,7 +26,7 @@ const void* lumicut_get_extension(const char* id) {
 lumicut_result lumicut_device_create(const lumicut_device_desc* desc, lumicut_device* device) {
   return guard([&] {
     const lumicut_device_desc in = read(desc);
-    const Checked c("lumicut_device_desc");
+    const FieldValidator c("lumicut_device_desc");
     if (device == nullptr) fail_argument("lumicut_device_create: device is NULL");
     if (in.abi_major != LUMICUT_ABI_MAJOR)
       c.fail_unknown("abi_major", number_text(uint64_t{in.abi_major}) + ", but this library speaks " +

@@ -96,7 +96,7 @@ lumicut_result lumicut_integrator_set(lumicut_integrator integrator, const char*
   return guard([&] {
     lumicut_integrator_t& i = object(integrator);
     if (name == nullptr || value == nullptr) fail_argument("lumicut_integrator_set: name or value is NULL");
-    const Gate::Hold hold = i.gate.change("lumicut_integrator_set");
+    const AccessGuard::Hold hold = i.gate.change("lumicut_integrator_set");
     i.params.set(name, value);
     if (i.entry.light_source == LightSource::emitters && i.params.find(name)->of_virtual_lights)
       i.device->log(LogLevel::warning,
@@ -119,7 +119,7 @@ const char* lumicut_integrator_get(lumicut_integrator integrator, const char* na
 lumicut_result lumicut_integrator_set_lights(lumicut_integrator integrator, const lumicut_vpl* lights, uint64_t count) {
   return guard([&] {
     lumicut_integrator_t& i = object(integrator);
-    const Gate::Hold hold = i.gate.change("lumicut_integrator_set_lights");
+    const AccessGuard::Hold hold = i.gate.change("lumicut_integrator_set_lights");
     if (count == 0) {
       i.host_lights.reset();
       i.host_profiles.clear();
@@ -137,8 +137,8 @@ lumicut_result lumicut_integrator_prepare(lumicut_integrator integrator, lumicut
   return guard([&] {
     lumicut_integrator_t& i = object(integrator);
     lumicut_scene_t& s = object(scene);
-    const Gate::Hold changing = i.gate.change("lumicut_integrator_prepare");
-    const Gate::Hold reading = s.gate.read("lumicut_integrator_prepare");
+    const AccessGuard::Hold changing = i.gate.change("lumicut_integrator_prepare");
+    const AccessGuard::Hold reading = s.gate.read("lumicut_integrator_prepare");
     s.require_committed();
     auto stats = std::make_unique<Stats>();
     run_work(i.work, [&](Progress& progress) { i.device->arena.run([&] { i.prepare_for(s, progress, *stats); }); });
@@ -151,7 +151,7 @@ lumicut_result lumicut_integrator_get_lights(lumicut_integrator integrator, cons
   return guard([&] {
     lumicut_integrator_t& i = object(integrator);
     if (lights == nullptr || count == nullptr) fail_argument("lumicut_integrator_get_lights: lights or count is NULL");
-    const Gate::Hold hold = i.gate.read("lumicut_integrator_get_lights");
+    const AccessGuard::Hold hold = i.gate.read("lumicut_integrator_get_lights");
     if (i.prepared == nullptr) fail_state("lumicut_integrator: it is not prepared");
     *lights = reinterpret_cast<const lumicut_vpl*>(i.prepared->vpls->lights.data());
     *count = i.prepared->vpls->lights.size();
@@ -164,11 +164,11 @@ lumicut_result lumicut_integrator_shade(lumicut_integrator integrator, const lum
     lumicut_integrator_t& i = object(integrator);
     if (count > 0 && (points == nullptr || radiance == nullptr))
       fail_argument("lumicut_integrator_shade: points or radiance is NULL, but count is " + number_text(count));
-    const Gate::Hold using_integrator = i.gate.read("lumicut_integrator_shade");
+    const AccessGuard::Hold using_integrator = i.gate.read("lumicut_integrator_shade");
     if (i.prepared == nullptr) fail_state("lumicut_integrator: it is not prepared");
     const Prepared& p = *i.prepared;
     lumicut_scene_t& s = i.prepared_scene();
-    const Gate::Hold using_scene = s.gate.read("lumicut_integrator_shade");
+    const AccessGuard::Hold using_scene = s.gate.read("lumicut_integrator_shade");
     if (s.changed || p.scene_version != s.scene.version())
       fail_state("lumicut_integrator: its scene was changed since lumicut_integrator_prepare");
     const std::shared_ptr<Progress> progress = i.work.share();

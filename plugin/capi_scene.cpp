@@ -14,7 +14,7 @@ template <typename Fn>
 lumicut_result change_scene(lumicut_scene scene, const char* caller, const Fn& fn) {
   return guard([&] {
     lumicut_scene_t& s = object(scene);
-    const Gate::Hold hold = s.gate.change(caller);
+    const AccessGuard::Hold hold = s.gate.change(caller);
     fn(s);
   });
 }

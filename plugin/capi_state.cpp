@@ -2,14 +2,14 @@
 #include <cstring>
 #include <limits>
 
+#include "lights/light_profile.h"
+#include "lights/trace_vpls.h"
 #include "plugin/check.h"
 #include "plugin/convert.h"
 #include "plugin/include/lumicut/lumicut_state.h"
 #include "plugin/objects.h"
 #include "plugin/state.h"
 #include "render/identity.h"
-#include "vpl/light_profile.h"
-#include "vpl/trace_vpls.h"
 
 using namespace lumicut;
 
@@ -49,7 +49,7 @@ std::vector<uint8_t> save(lumicut_integrator_t& i) {
   if (i.prepared == nullptr) fail_state("lumicut_integrator: nothing is prepared, so nothing can be saved");
   const Prepared& p = *i.prepared;
   lumicut_scene_t& s = i.prepared_scene();
-  const Gate::Hold reading = s.gate.read("lumicut_state_extension.save");
+  const AccessGuard::Hold reading = s.gate.read("lumicut_state_extension.save");
   if (s.changed || p.scene_version != s.scene.version())
     fail_state("lumicut_integrator: its scene was changed since it was prepared");
   const std::vector<uint8_t> own = p.method->save_state();
@@ -148,7 +148,7 @@ void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uin
 lumicut_result save_state(lumicut_integrator integrator, void* bytes, uint64_t* size) {
   return guard([&] {
     lumicut_integrator_t& i = object(integrator);
-    const Gate::Hold hold = i.gate.change("lumicut_state_extension.save");
+    const AccessGuard::Hold hold = i.gate.change("lumicut_state_extension.save");
     if (size == nullptr) fail_argument("lumicut_state_extension.save: size is NULL");
     const std::vector<uint8_t> state = i.device->arena.run([&] { return save(i); });
     if (bytes != nullptr) {
@@ -165,8 +165,8 @@ lumicut_result load_state(lumicut_integrator integrator, lumicut_scene scene, co
   return guard([&] {
     lumicut_integrator_t& i = object(integrator);
     lumicut_scene_t& s = object(scene);
-    const Gate::Hold changing = i.gate.change("lumicut_state_extension.load");
-    const Gate::Hold reading = s.gate.read("lumicut_state_extension.load");
+    const AccessGuard::Hold changing = i.gate.change("lumicut_state_extension.load");
+    const AccessGuard::Hold reading = s.gate.read("lumicut_state_extension.load");
     s.require_committed();
     if (s.device.get() != i.device.get())
       fail_argument("lumicut_scene: it belongs to another device than the integrator");

@@ -4,7 +4,7 @@
 
 namespace lumicut {
 
-std::string Checked::field(const char* name, int64_t k) const {
+std::string FieldValidator::field(const char* name, int64_t k) const {
   std::string text = type_;
   if (index_ >= 0) text += "[" + number_text(index_) + "]";
   text += std::string(".") + name;
@@ -12,33 +12,33 @@ std::string Checked::field(const char* name, int64_t k) const {
   return text;
 }
 
-void Checked::fail(const char* name, const std::string& what, int64_t k) const {
+void FieldValidator::fail(const char* name, const std::string& what, int64_t k) const {
   throw Error(ErrorCode::invalid_argument, field(name, k) + ": " + what);
 }
 
-void Checked::fail_unknown(const char* name, const std::string& what, int64_t k) const {
+void FieldValidator::fail_unknown(const char* name, const std::string& what, int64_t k) const {
   throw Error(ErrorCode::unsupported, field(name, k) + ": " + what);
 }
 
-void Checked::fail_range(const char* name, float v, float low, float high, int64_t k) const {
+void FieldValidator::fail_range(const char* name, float v, float low, float high, int64_t k) const {
   fail(
       name,
       number_text(v) + " is not in [" + number_text(low) + ", " + (std::isinf(high) ? "inf)" : number_text(high) + "]"),
       k);
 }
 
-void Checked::integer(const char* name, uint64_t v, uint64_t low, uint64_t high) const {
+void FieldValidator::integer(const char* name, uint64_t v, uint64_t low, uint64_t high) const {
   if (v < low || v > high)
     fail(name, number_text(v) + " is not in [" + number_text(low) + ", " + number_text(high) + "]");
 }
 
-void Checked::flags(const char* name, uint32_t v, uint32_t known) const {
+void FieldValidator::flags(const char* name, uint32_t v, uint32_t known) const {
   if ((v & ~known) != 0)
     fail_unknown(name, number_text(uint64_t{v}) +
                            " has bits that are not known here (known: " + number_text(uint64_t{known}) + ")");
 }
 
-Vec3f Checked::direction(const char* name, const float (&v)[3]) const {
+Vec3f FieldValidator::direction(const char* name, const float (&v)[3]) const {
   finite(name, v);
   const Vec3d d{v[0], v[1], v[2]};  // double: the square of a tiny float is 0
   const double l = length(d);

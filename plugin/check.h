@@ -13,10 +13,10 @@
 namespace lumicut {
 
 // The structure that fields belong to, for texts. Costs nothing until a check fails.
-class Checked {
+class FieldValidator {
  public:
-  explicit Checked(const char* type) : type_(type) {}
-  Checked(const char* type, uint64_t index) : type_(type), index_(static_cast<int64_t>(index)) {}
+  explicit FieldValidator(const char* type) : type_(type) {}
+  FieldValidator(const char* type, uint64_t index) : type_(type), index_(static_cast<int64_t>(index)) {}
 
   std::string field(const char* name, int64_t k = -1) const;
   // "field: <what>" as INVALID_ARGUMENT, or UNSUPPORTED.

@@ -6,9 +6,9 @@
 
 #include "accel/bvh_build.h"
 #include "core/parallel.h"
+#include "lights/light_profile.h"
 #include "plugin/check.h"
 #include "plugin/descriptors.h"
-#include "vpl/light_profile.h"
 
 namespace lumicut {
 
@@ -23,7 +23,7 @@ constexpr float kMinAngle = 0.002f;
 Vec3f vec(const float (&v)[3]) { return {v[0], v[1], v[2]}; }
 Vec3d vec_double(const float (&v)[3]) { return {v[0], v[1], v[2]}; }
 
-int32_t texture_index(const Checked& c, const char* name, int32_t one_based) {
+int32_t texture_index(const FieldValidator& c, const char* name, int32_t one_based) {
   if (one_based < 0) c.fail(name, number_text(int64_t{one_based}) + " is negative; 0 means none, 1 the first texture");
   return one_based - 1;
 }
@@ -34,7 +34,7 @@ double edge_cosine(const Vec3d& a, const Vec3d& b) {
   return l > 0 ? std::abs(dot(a, b)) / l : 1.0;
 }
 
-void check_count(const Checked& c, const char* name, uint64_t count) { c.integer(name, count, 0, 0xfffffffeu); }
+void check_count(const FieldValidator& c, const char* name, uint64_t count) { c.integer(name, count, 0, 0xfffffffeu); }
 
 const char* type_name(uint32_t type) {
   static constexpr const char* kNames[] = {"point", "spot", "rectangle", "disk", "sun"};
@@ -44,7 +44,7 @@ const char* type_name(uint32_t type) {
 }  // namespace
 
 Scene::Config to_accel(const char* owner, uint32_t robust, const char* kind, const char* builder) {
-  const Checked c(owner);
+  const FieldValidator c(owner);
   c.integer("robust", robust, 0, LUMICUT_FAST);
   Scene::Config out;
   out.robust = robust != LUMICUT_FAST;
@@ -56,7 +56,7 @@ Scene::Config to_accel(const char* owner, uint32_t robust, const char* kind, con
 }
 
 Texture to_texture(const lumicut_texture& in, uint64_t index) {
-  const Checked c("lumicut_texture", index);
+  const FieldValidator c("lumicut_texture", index);
   c.integer("width", in.width, 1, 65536);
   c.integer("height", in.height, 1, 65536);
   c.integer("channels", in.channels, 1, 4);
@@ -73,7 +73,7 @@ Texture to_texture(const lumicut_texture& in, uint64_t index) {
 }
 
 Material to_material(const lumicut_material& in, uint64_t index) {
-  const Checked c("lumicut_material", index);
+  const FieldValidator c("lumicut_material", index);
   c.flags("flags", in.flags, LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG | LUMICUT_GGX | LUMICUT_NO_FRESNEL);
   if ((in.flags & LUMICUT_PHONG) != 0 && (in.flags & LUMICUT_GGX) != 0)
     c.fail("flags", "holds both LUMICUT_PHONG and LUMICUT_GGX");
@@ -135,7 +135,7 @@ std::vector<Vec3f> to_normals(const float* xyz, uint64_t count) {
 
 std::vector<Vec3f> to_positions(const float* xyz, uint64_t count, const char* owner) {
   std::vector<Vec3f> out = to_normals(xyz, count);
-  const Checked c(owner);
+  const FieldValidator c(owner);
   for (uint64_t i = 0; i < out.size(); ++i)
     for (int k = 0; k < 3; ++k) c.coordinate("positions", out[i][k], static_cast<int64_t>(3 * i) + k);
   return out;
@@ -148,14 +148,14 @@ std::vector<Transform> to_transforms(const float* m, uint64_t count, const char*
   for (uint64_t i = 0; i < count; ++i)
     for (int k = 0; k < 12; ++k) {
       const float v = m[12 * i + k];
-      Checked(owner).finite("transforms", v, static_cast<int64_t>(12 * i) + k);
+      FieldValidator(owner).finite("transforms", v, static_cast<int64_t>(12 * i) + k);
       out[i].m[k] = v;
     }
   return out;
 }
 
 Mesh to_mesh(const lumicut_mesh& in) {
-  const Checked c("lumicut_mesh");
+  const FieldValidator c("lumicut_mesh");
   check_count(c, "vertex_count", in.vertex_count);
   check_count(c, "triangle_count", in.triangle_count);
   check_count(c, "transform_count", in.transform_count);
@@ -194,7 +194,7 @@ Mesh to_mesh(const lumicut_mesh& in) {
 }
 
 ProfileRef to_profile(const lumicut_profile& in, uint64_t index) {
-  const Checked c("lumicut_profile", index);
+  const FieldValidator c("lumicut_profile", index);
   c.integer("vertical_count", in.vertical_count, 2, 65536);
   c.integer("horizontal_count", in.horizontal_count, 1, 65536);
   if (in.reserved != 0) c.fail_unknown("reserved", number_text(uint64_t{in.reserved}) + " is not 0");
@@ -214,7 +214,7 @@ ProfileRef to_profile(const lumicut_profile& in, uint64_t index) {
 }
 
 Light to_light(const lumicut_light& in, uint64_t index, const std::vector<ProfileRef>& profiles) {
-  const Checked c("lumicut_light", index);
+  const FieldValidator c("lumicut_light", index);
   c.integer("type", in.type, LUMICUT_POINT, LUMICUT_SUN);
   c.integer("unit", in.unit, LUMICUT_RADIOMETRIC, LUMICUT_WATT);
   c.integer("group", in.group, 0, kMaxGroup);
@@ -286,7 +286,7 @@ Light to_light(const lumicut_light& in, uint64_t index, const std::vector<Profil
 }
 
 Environment to_environment(const lumicut_environment& in) {
-  const Checked c("lumicut_environment");
+  const FieldValidator c("lumicut_environment");
   c.integer("group", in.group, 0, kMaxGroup);
   c.not_negative("color", in.color);
   c.flags("flags", in.flags, LUMICUT_HIDDEN);
@@ -314,7 +314,7 @@ Environment to_environment(const lumicut_environment& in) {
 }
 
 Camera to_camera(const lumicut_camera& in) {
-  const Checked c("lumicut_camera");
+  const FieldValidator c("lumicut_camera");
   c.integer("orthographic", in.orthographic, 0, 1);
   for (int k = 0; k < 12; ++k) c.finite("to_world", in.to_world[k], k);
   for (const int k : {3, 7, 11}) c.coordinate("to_world", in.to_world[k], k);
@@ -373,7 +373,7 @@ VplSet to_vpls(const lumicut_vpl* lights, uint64_t count) {
   set.lights.resize(count);
   for (uint64_t i = 0; i < count; ++i) {
     const lumicut_vpl& in = lights[i];
-    const Checked c("lumicut_vpl", i);
+    const FieldValidator c("lumicut_vpl", i);
     c.integer("kind", in.kind, LUMICUT_VPL_OMNI, LUMICUT_VPL_SPHERE);
     c.integer("group", in.group, 0, kMaxGroup);
     c.not_negative("intensity", in.intensity);
@@ -419,7 +419,7 @@ VplSet to_vpls(const lumicut_vpl* lights, uint64_t count) {
 }
 
 namespace {
-void check_unit(const Checked& c, const char* name, const float (&v)[3]) {
+void check_unit(const FieldValidator& c, const char* name, const float (&v)[3]) {
   c.finite(name, v);
   const double l = length(vec_double(v));
   if (std::abs(l - 1.0) > 1e-2) c.fail(name, "has length " + number_text(l) + ", not 1");
@@ -431,7 +431,7 @@ void check_points(const Scene& scene, const lumicut_point* points, uint64_t coun
   const size_t materials = scene.materials().size();
   parallel_chunks(count, 16384, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
-      const Checked c("lumicut_point", i);
+      const FieldValidator c("lumicut_point", i);
       const lumicut_point& p = points[i];
       c.coordinate("position", p.position);
       check_unit(c, "normal", p.normal);
@@ -462,7 +462,7 @@ std::vector<uint64_t> append_points(const Scene& scene, const lumicut_point* poi
 }
 
 FrameOptions to_frame_options(const lumicut_render_desc& in) {
-  const Checked c("lumicut_render_desc");
+  const FieldValidator c("lumicut_render_desc");
   c.integer("width", in.width, 1, 65536);
   c.integer("height", in.height, 1, 65536);
   c.integer("samples", in.samples, 0, 65536);
@@ -490,7 +490,7 @@ FrameOptions to_frame_options(const lumicut_render_desc& in) {
 }
 
 IterationOptions to_pass_options(const lumicut_render_desc& in) {
-  const Checked c("lumicut_render_desc");
+  const FieldValidator c("lumicut_render_desc");
   c.not_negative("max_seconds", in.max_seconds);
   c.range("target_error", in.target_error, 0.0f, 1e6f);
   c.range("confidence", in.confidence, 0.0f, 0.999999f);

@@ -5,12 +5,12 @@
 #include <memory>
 
 #include "film/film.h"
+#include "lights/light_profile.h"
+#include "lights/vpl.h"
 #include "plugin/boundary.h"
 #include "render/frame.h"
 #include "render/iterations.h"
 #include "scene/scene.h"
-#include "vpl/light_profile.h"
-#include "vpl/vpl.h"
 
 namespace lumicut {
 

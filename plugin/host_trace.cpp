@@ -71,7 +71,7 @@ class HostTrace final : public Accel {
 }  // namespace
 
 Scene::AccelFactory host_trace(const lumicut_trace& in) {
-  const Checked c("lumicut_trace");
+  const FieldValidator c("lumicut_trace");
   if (in.intersect == nullptr) c.fail("intersect", "is NULL");
   if (in.occluded == nullptr) c.fail("occluded", "is NULL");
   lumicut_trace host = in;

@@ -92,7 +92,7 @@ struct lumicut_scene_t : lumicut::ObjectOf<lumicut_scene_t> {
   void require_committed() const;
 
   lumicut::Ref<lumicut_device_t> device;
-  lumicut::Gate gate{lumicut::HandleKind::scene};
+  lumicut::AccessGuard gate{lumicut::HandleKind::scene};
   lumicut::Work work;
   lumicut::Scene scene;
   std::vector<lumicut::ProfileRef> profiles;        // for lights that are set after
@@ -113,7 +113,7 @@ struct lumicut_integrator_t : lumicut::ObjectOf<lumicut_integrator_t>, lumicut::
   lumicut_scene_t& prepared_scene() const;
 
   lumicut::Ref<lumicut_device_t> device;
-  lumicut::Gate gate{lumicut::HandleKind::integrator};
+  lumicut::AccessGuard gate{lumicut::HandleKind::integrator};
   lumicut::Work work;
   std::unique_ptr<lumicut::Stats> stats = std::make_unique<lumicut::Stats>();
   std::string stats_text;

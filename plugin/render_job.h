@@ -57,7 +57,7 @@ struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
 
   lumicut::Ref<lumicut_integrator_t> integrator_;
   lumicut::Ref<lumicut_scene_t> scene_;
-  lumicut::Gate::Hold using_integrator_, using_scene_;
+  lumicut::AccessGuard::Hold using_integrator_, using_scene_;
   std::shared_ptr<lumicut::Progress> progress_;
   std::unique_ptr<lumicut::RenderLoop> loop_;
   const uint32_t columns_, rows_;

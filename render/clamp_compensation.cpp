@@ -1,8 +1,8 @@
 #include "render/clamp_compensation.h"
 
-#include "clusters/light_kernel.h"
+#include "clustering/light_kernel.h"
 #include "core/sampling.h"
-#include "scene/place_rng.h"
+#include "scene/rng_at_point.h"
 
 namespace lumicut {
 
@@ -12,9 +12,9 @@ ClampCompensation::ClampCompensation(const Scene& scene, float distance, bool sp
       distance_(distance),
       spheres_(spheres),
       seed_(seed),
-      emitters_(scene, &progress),
-      lamps_(scene, emitters_, distance, progress),
-      lamp_surfaces_(scene) {}
+      sampler_(scene, &progress),
+      lamps_(scene, sampler_, distance, progress),
+      light_surfaces_(scene) {}
 
 void ClampCompensation::nearby_lights(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows,
                                       TracedPoints& hits) const {
@@ -29,7 +29,7 @@ void ClampCompensation::nearby_lights(const SurfacePoint& point, Rng& rng, std::
 // By power over all meshes: where few emit, most samples hit a near one; where many do, the rays find them.
 void ClampCompensation::near_mesh(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows,
                                   TracedPoints& hits) const {
-  const DirectSample s = emitters_.sample_one(rng);
+  const DirectSample s = sampler_.sample_light(rng);
   if (!s.on_mesh) return;
   const Vec3f v = s.vpl.position - point.position;
   const float d2 = length2(v), c2 = distance_ * distance_;
@@ -58,9 +58,9 @@ TracedPoints ClampCompensation::trace(const ShadePoints& points, uint32_t level,
   for (size_t i = 0; i < points.size(); ++i) {
     if (i % 4096 == 0) progress.check();
     const SurfacePoint point = points.get(i);
-    Rng rng = place_rng(scene_, point, hash64(seed_, level), Stage::eye_ray);
+    Rng rng = rng_at_point(scene_, point, hash64(seed_, level), Stage::eye_ray);
     if (!lamps_.empty()) nearby_lights(point, rng, shadows, hits);
-    if (emitters_.has_meshes()) near_mesh(point, rng, shadows, hits);
+    if (sampler_.has_meshes()) near_mesh(point, rng, shadows, hits);
     const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float();
     const auto s = PointBsdf(point).sample(choice, u, v);
     if (!s || !is_finite(s->weight)) continue;
@@ -78,9 +78,9 @@ TracedPoints ClampCompensation::trace(const ShadePoints& points, uint32_t level,
   counters.rays += shadows.size() + rays.size();
   for (size_t i = 0; i < rays.size(); ++i) {
     if (i % 4096 == 0) progress.check();
-    if (!lamp_surfaces_.empty())
-      lamp_surfaces_.for_each_hit(
-          rays[i].ray.org, rays[i].ray.dir, std::min(rays[i].ray.tfar, distance_), [&](const LampSurfaces::Hit& lamp) {
+    if (!light_surfaces_.empty())
+      light_surfaces_.for_each_hit(
+          rays[i].ray.org, rays[i].ray.dir, std::min(rays[i].ray.tfar, distance_), [&](const LightSurfaces::Hit& lamp) {
             const float share = lamp.t / distance_;
             const double density = double{lamp.t} * lamp.t / (double{lamp.cosine} * lamp.area);
             hits.add(weights[i] * lamp.radiance * ((1.0f - share * share) * power_heuristic(pdfs[i], density)),
@@ -93,7 +93,7 @@ TracedPoints ClampCompensation::trace(const ShadePoints& points, uint32_t level,
     if (lost > 0.0f) {
       if (max_component(at.emitted) > 0.0f) {
         const double cosine = std::max(1e-9f, std::abs(dot(at.geometric_normal, at.to_viewer)));
-        const double density = emitters_.mesh_density(at) * double{at.t} * at.t / cosine;
+        const double density = sampler_.mesh_density(at) * double{at.t} * at.t / cosine;
         hits.add(at.emitted * weights[i] * (lost * power_heuristic(pdfs[i], density)), pixels[i],
                  scene_.meshes()[at.mesh].group);
       }
@@ -111,7 +111,7 @@ TracedPoints ClampCompensation::trace(const ShadePoints& points, uint32_t level,
       hits.found.push_back(point);
     }
   }
-  follow_chains(scene_, lamp_surfaces_, std::move(chains), progress, hits, counters);
+  follow_chains(scene_, light_surfaces_, std::move(chains), progress, hits, counters);
   return hits;
 }
 

@@ -6,10 +6,10 @@
 #include <memory>
 
 #include "core/stats.h"
+#include "lights/light_surfaces.h"
 #include "render/nearby_lights.h"
 #include "render/specular_chain.h"
 #include "scene/scene.h"
-#include "vpl/lamp_surfaces.h"
 
 namespace lumicut {
 
@@ -32,9 +32,9 @@ class ClampCompensation {
   const float distance_;
   const bool spheres_;
   const uint64_t seed_;
-  Emitters emitters_;
+  LightSampler sampler_;
   NearbyLights lamps_;
-  LampSurfaces lamp_surfaces_;
+  LightSurfaces light_surfaces_;
 };
 
 }  // namespace lumicut

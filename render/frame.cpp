@@ -47,7 +47,7 @@ class Batch {
  public:
   // `lamps`: where anything of the scene may be specular.
   Batch(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options,
-        const LampSurfaces* lamps)
+        const LightSurfaces* lamps)
       : scene_(scene), methods_(methods), options_(options), lamps_(lamps) {}
 
   void add_tile(const Rect& tile) {
@@ -270,7 +270,7 @@ class Batch {
   const Scene& scene_;
   const std::span<const GroupMethod> methods_;
   const FrameOptions& options_;
-  const LampSurfaces* const lamps_;
+  const LightSurfaces* const lamps_;
   std::vector<Rect> tiles_;
   std::vector<Pixel> pixels_;
   std::vector<PixelSums> sums_;
@@ -329,7 +329,7 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
     batches.emplace_back(first, last);
     first = last;
   }
-  std::optional<LampSurfaces> lamps;
+  std::optional<LightSurfaces> lamps;
   if (scene.may_be_specular()) lamps.emplace(scene);
   std::optional<ClampCompensation> compensation;
   if (options.compensate > 0.0f)

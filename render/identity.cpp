@@ -3,7 +3,7 @@
 #include <charconv>
 
 #include "hwy/highway.h"
-#include "vpl/light_profile.h"
+#include "lights/light_profile.h"
 
 namespace lumicut {
 

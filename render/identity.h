@@ -6,9 +6,9 @@
 
 #include "core/number_text.h"
 #include "integrators/integrator.h"
+#include "lights/vpl.h"
 #include "render/hash.h"
 #include "scene/scene.h"
-#include "vpl/vpl.h"
 
 namespace lumicut {
 

@@ -1,10 +1,10 @@
 #include "render/nearby_lights.h"
 
 #include "bsdf/point_bsdf.h"
-#include "clusters/light_kernel.h"
+#include "clustering/light_kernel.h"
 #include "core/rng.h"
 #include "core/sampling.h"
-#include "vpl/lamp_surfaces.h"
+#include "lights/light_surfaces.h"
 
 namespace lumicut {
 
@@ -28,8 +28,8 @@ Aabb bounds_of(const Light& l) {
 
 }  // namespace
 
-NearbyLights::NearbyLights(const Scene& scene, const Emitters& emitters, float distance, const Progress& progress)
-    : scene_(scene), emitters_(emitters), distance_(distance) {
+NearbyLights::NearbyLights(const Scene& scene, const LightSampler& emitters, float distance, const Progress& progress)
+    : scene_(scene), sampler_(emitters), distance_(distance) {
   for (uint32_t i = 0; i < scene.lights().size(); ++i) {
     if (i % 64 == 0) progress.check();  // thousands of cells each
     const Light& light = scene.lights()[i];
@@ -66,10 +66,10 @@ Rgb NearbyLights::lost_light(uint32_t lamp, const Vpl& vpl, const SurfacePoint& 
   if (!(d2 < c2)) return {};
   Rgb lost = light_point(vpl, vpl.intensity, 0.0f, point) * (1.0f - d2 / c2);
   const Light& light = scene_.lights()[lamp];
-  if (LampSurfaces::has(light) && max_component(lost) > 0.0f) {
+  if (LightSurfaces::has(light) && max_component(lost) > 0.0f) {
     const Vec3f to_light = normalize(vpl.position - point.position);
     const double cosine = std::max(1e-9f, -dot(vpl.normal, to_light));
-    lost = lost * power_heuristic(d2 / (cosine * LampSurfaces::area(light)), PointBsdf(point).pdf(to_light));
+    lost = lost * power_heuristic(d2 / (cosine * LightSurfaces::area(light)), PointBsdf(point).pdf(to_light));
   }
   return lost;
 }

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
-#include "vpl/trace_vpls.h"
+#include "lights/trace_vpls.h"
 
 namespace lumicut {
 

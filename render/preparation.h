@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "integrators/integrator.h"
-#include "vpl/light_profile.h"
+#include "lights/light_profile.h"
 
 namespace lumicut {
 

@@ -16,7 +16,7 @@ std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uin
   return ChainRay{bsdf.origin(s->flags), s->direction, weight / survive, pixel, rng};
 }
 
-void follow_chains(const Scene& scene, const LampSurfaces& lamps, std::vector<ChainRay> chains,
+void follow_chains(const Scene& scene, const LightSurfaces& lamps, std::vector<ChainRay> chains,
                    const Progress& progress, TracedPoints& hits, Counters& counters) {
   std::vector<RayHit> rays;
   for (uint32_t depth = 0; depth < kMaxSurfaces && !chains.empty(); ++depth) {
@@ -30,7 +30,7 @@ void follow_chains(const Scene& scene, const LampSurfaces& lamps, std::vector<Ch
       if (i % 4096 == 0) progress.check();
       const ChainRay& chain = chains[i];
       if (!lamps.empty())
-        lamps.for_each_hit(chain.origin, chain.direction, rays[i].ray.tfar, [&](const LampSurfaces::Hit& lamp) {
+        lamps.for_each_hit(chain.origin, chain.direction, rays[i].ray.tfar, [&](const LightSurfaces::Hit& lamp) {
           hits.add(chain.throughput * lamp.radiance, chain.pixel, scene.lights()[lamp.lamp].group);
         });
       if (rays[i].hit.geom == kNoId) {

@@ -2,9 +2,9 @@
 #pragma once
 
 #include "core/stats.h"
+#include "lights/light_surfaces.h"
 #include "render/traced_points.h"
 #include "scene/scene.h"
-#include "vpl/lamp_surfaces.h"
 
 namespace lumicut {
 
@@ -19,7 +19,7 @@ struct ChainRay {
 std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uint32_t pixel, Rng rng);
 
 // Follows the rays to their ends. Lamps with an area are seen in mirrors, though not by the camera itself.
-void follow_chains(const Scene& scene, const LampSurfaces& lamps, std::vector<ChainRay> rays, const Progress& progress,
+void follow_chains(const Scene& scene, const LightSurfaces& lamps, std::vector<ChainRay> rays, const Progress& progress,
                    TracedPoints& hits, Counters& counters);
 
 }  // namespace lumicut

@@ -10,7 +10,7 @@ ROOT = pathlib.Path(os.environ.get("LUMICUT_SOURCE_DIR", pathlib.Path(__file__).
 BUILD = pathlib.Path(os.environ.get("LUMICUT_BINARY_DIR", ROOT / "build/release"))
 
 # The layers of the library, highest first. A folder includes from itself and from the folders below it.
-LAYERS = ["plugin", "render", "integrators", "clusters", "vpl", "film", "scene", "bsdf", "geometry", "accel", "core"]
+LAYERS = ["plugin", "render", "integrators", "clustering", "lights", "film", "scene", "bsdf", "geometry", "accel", "core"]
 # "lumicut" is the public header, plugin/include/lumicut.
 MAY_INCLUDE = {folder: set(LAYERS[index:]) for index, folder in enumerate(LAYERS)}
 MAY_INCLUDE["plugin"] |= {"lumicut"}

@@ -17,7 +17,7 @@
 #include "accel/embree_api.h"
 #include "bench/bvh/meshes.h"
 #include "bench/bvh/rays.h"
-#include "clusters/light_policy.h"
+#include "clustering/light_policy.h"
 #include "core/rng.h"
 
 using namespace lumicut;

@@ -8,12 +8,12 @@
 
 #include "accel/embree_api.h"
 #include "bench/bvh/meshes.h"
-#include "clusters/light_kernel.h"
-#include "clusters/light_tree.h"
+#include "clustering/light_kernel.h"
+#include "clustering/light_tree.h"
 #include "core/parallel.h"
 #include "integrators/integrator.h"
-#include "vpl/emitters.h"
-#include "vpl/trace_vpls.h"
+#include "lights/light_sampler.h"
+#include "lights/trace_vpls.h"
 
 namespace lumicut::bench {
 namespace {

@@ -9,7 +9,7 @@
 #include <cmath>
 
 #include "accel/agglomerate-inl.h"
-#include "clusters/light_policy.h"
+#include "clustering/light_policy.h"
 #include "core/cone.h"
 #include "core/error.h"
 #include "tests/accel/meshes.h"

@@ -3,7 +3,7 @@
 #include <cstring>
 #include <numbers>
 
-#include "clusters/light_kernel.h"
+#include "clustering/light_kernel.h"
 #include "core/error.h"
 #include "tests/support/render.h"
 

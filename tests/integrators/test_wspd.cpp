@@ -3,7 +3,7 @@
 #include <cstring>
 #include <thread>
 
-#include "clusters/block_kernel.h"
+#include "clustering/block_kernel.h"
 #include "tests/support/render.h"
 
 namespace lumicut {

@@ -3,9 +3,9 @@
 
 #include <set>
 
+#include "lights/light_profile.h"
 #include "render/frame.h"
 #include "render/identity.h"
-#include "vpl/light_profile.h"
 
 namespace {
 

@@ -2,9 +2,9 @@
 #pragma once
 
 #include "core/parallel.h"
+#include "lights/trace_vpls.h"
 #include "render/frame.h"
 #include "tests/support/test_scenes.h"
-#include "vpl/trace_vpls.h"
 
 namespace lumicut::test {
 

@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "core/rng.h"
+#include "lights/vpl.h"
 #include "scene/scene.h"
-#include "vpl/vpl.h"
 
 namespace lumicut::test {
 

@@ -1,0 +1,46 @@
+#include "clustering/bounds.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "clustering/bounds.cpp"
+#include "hwy/foreach_target.h"  // compiles this file once a target; before highway.h
+
+#include "clustering/bounds-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace lumicut::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+void LightNodeBounds(const LightNode& node, const PointBlock& block, float clamp2, float* bounds) {
+  NodeBounds(node, block, clamp2, bounds);
+}
+
+}  // namespace lumicut::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace lumicut {
+HWY_EXPORT(LightNodeBounds);
+
+void light_node_bounds(const LightNode& node, const PointBlock& block, float clamp2, float* bounds) {
+  HWY_DYNAMIC_DISPATCH(LightNodeBounds)(node, block, clamp2, bounds);
+}
+
+void PointBlock::load(const ShadePoints& points, size_t first) {
+  glossy = points.glossy();
+  ggx = false;
+  for (size_t i = 0; i < kLanes; ++i) {
+    const SurfacePoint p = points.get(first + i);
+    const Frame n(p.normal), m(p.mirror);
+    for (int k = 0; k < 3; ++k) {
+      position[k][i] = p.position[k];
+      normal[k][i] = p.normal[k], tangent[k][i] = n.t[k], bitangent[k][i] = n.b[k];
+      mirror[k][i] = p.mirror[k], mirror_tangent[k][i] = m.t[k], mirror_bitangent[k][i] = m.b[k];
+      diffuse[k][i] = p.diffuse[k], specular[k][i] = p.specular[k], grazing[k][i] = p.grazing[k];
+    }
+    exponent[i] = p.exponent, falloff[i] = p.falloff, alpha[i] = p.alpha;
+    ggx = ggx || p.ggx();
+  }
+}
+
+}  // namespace lumicut
+#endif

@@ -1,0 +1,65 @@
+// One light against many points: the inner loop of every method. SIMD over points, picked at run time.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "accel/accel.h"
+#include "bsdf/shade_points.h"
+#include "core/stats.h"
+#include "lights/vpl.h"
+
+namespace lumicut {
+
+// Most points that one call takes.
+inline constexpr size_t kMaxLit = 256;
+
+// Points that a light reaches if nothing stands between: contribution in radiance, and where the shadow ray ends.
+struct LitPoints {
+  alignas(64) float x[kMaxLit + kLanes], y[kMaxLit + kLanes], z[kMaxLit + kLanes];
+  alignas(64) float r[kMaxLit + kLanes], g[kMaxLit + kLanes], b[kMaxLit + kLanes];
+  alignas(64) uint32_t index[kMaxLit + kLanes];  // counted from the first point of the call
+  uint8_t occluded[kMaxLit + kLanes];
+  size_t count = 0;
+};
+
+// How the directions of a cluster of oriented lights scatter about their mean: 2/π times their covariance.
+struct DirectionScatter {
+  float xx = 0.0f, yy = 0.0f, zz = 0.0f, xy = 0.0f, xz = 0.0f, yz = 0.0f;
+};
+
+// Mean of the lights' cosines, each cut off at 90 degrees: (c + √(c² + s)) / 2, c the cosine of their mean direction
+// (as short as such a mean is) and s the scatter along `to_light`. Exact where nothing scatters, and about a mean of 0
+// where cosines are normally distributed; in between within a few hundredths.
+inline float mean_cosine(const Vec3f& direction, const DirectionScatter& s, const Vec3f& to_light) {
+  const Vec3f& t = to_light;
+  const float c = -dot(direction, t);
+  const float along = t.x * t.x * s.xx + t.y * t.y * s.yy + t.z * t.z * s.zz +
+                      2.0f * (t.x * t.y * s.xy + t.x * t.z * s.xz + t.y * t.z * s.yz);
+  return 0.5f * (c + std::sqrt(c * c + std::max(0.0f, along)));
+}
+
+// Unshadowed radiance of `light`, with the summed intensity `intensity` in place of its own, at points
+// [first, first + count) of `points`; first a multiple of kLanes, count <= kMaxLit. Only points that get any are kept,
+// in order. `clamp2`: squared distance below which no light comes nearer; spheres need none. [thesis Eq. 1.1 without V]
+// `lanes`, where given, holds a bit for each point (kLanes points a word, as many words as points need): only points
+// whose bit is set are kept.
+// `scatter`, for oriented lights and spheres: `light` is the mean of a cluster, its normal their mean direction.
+void light_points(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
+                  size_t count, LitPoints& lit, const uint16_t* lanes = nullptr,
+                  const DirectionScatter* scatter = nullptr);
+
+// Shadow rays from the light to the lit points; fills `occluded`.
+inline void trace_lit(const Accel& accel, const Vpl& light, LitPoints& lit) {
+  if (lit.count == 0) return;
+  const bool directional = light.kind == VplKind::directional;
+  accel.occluded_from_point(directional ? -light.normal : light.position, directional, lit.x, lit.y, lit.z, lit.count,
+                            lit.occluded);
+}
+
+// The same for one point, in plain arithmetic: what the kernel is tested against, and for code that is not hot.
+// Spheres: one lane of the kernel.
+Rgb light_point(const Vpl& light, const Rgb& intensity, float clamp2, const SurfacePoint& point);
+
+}  // namespace lumicut

@@ -1,0 +1,42 @@
+// Upper bounds of what a cluster of lights can give to any point of a cluster of points. [thesis Eq. 3.4; Walter et al.
+// 2006 sec. 3.4]
+#pragma once
+
+#include "bsdf/shade_points.h"
+#include "clustering/light_tree.h"
+
+namespace lumicut {
+
+// kLanes clusters of points, structure of arrays: everything that a bound of a pair reads.
+struct alignas(64) PointNodes {
+  float center[3][kLanes], half[3][kLanes];  // box of positions
+  // Frames of the cones of normals and of mirror directions (axis last: normal, mirror), and their half-angles.
+  float normal[3][kLanes], tangent[3][kLanes], bitangent[3][kLanes], normal_cos[kLanes], normal_sin[kLanes];
+  float mirror[3][kLanes], mirror_tangent[3][kLanes], mirror_bitangent[3][kLanes], mirror_cos[kLanes],
+      mirror_sin[kLanes];
+  float diffuse[3][kLanes], specular[3][kLanes];  // largest of the points, channel by channel
+  float exponent[kLanes];                         // least of Blinn's and Phong's points
+  float schlick[3][kLanes], grazing[3][kLanes];   // F0 and F90: largest of the GGX points, channel by channel
+  float alpha2_low[kLanes], alpha2_high[kLanes];  // least and largest α² of the GGX points
+  float view_cosine[kLanes];                      // least cosine of a GGX point's normal to the viewer
+  float falloff[kLanes];                          // least of all points
+  float radius2[kLanes];                          // squared half diagonal of the box
+  uint32_t used = 0;                              // bits of the lanes that hold points; the others hold copies
+  bool glossy = false, ggx = false;               // any of the points
+
+  // Lane `lane` becomes the cluster of points [first, first + count) of `points`, count > 0.
+  void set(size_t lane, const ShadePoints& points, size_t first, size_t count);
+  // Lanes from `lane` on become copies of the one before.
+  void pad(size_t lane);
+};
+
+// For each lane: an upper bound of the luminance of the radiance that any way of summing the node's lights can give to
+// any point of the cluster, visibility taken as 1. `clamp2` as in light_points. The distance is that of the boxes,
+// never below the clamp. Conservative: tested against all pairs; 0 only where no light reaches any point.
+void pair_bounds(const LightNode& node, const PointNodes& nodes, float clamp2, float* bounds);
+
+// For each lane: squared distance of the boxes of positions over the squared clamp distance's floor; directional lights
+// are infinitely far.
+void pair_distances2(const LightNode& node, const PointNodes& nodes, float clamp2, float* distances2);
+
+}  // namespace lumicut

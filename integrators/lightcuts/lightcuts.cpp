@@ -1,0 +1,99 @@
+// Lightcuts: each point is lit by a cut through the light tree, refined until every cluster's error bound lies under a
+// share of the point's radiance. [Walter et al. 2005, sec. 3-4; tree: Walter et al. 2008, sec. 5]
+// Departs: neighbouring points descend together (integrators/lightcuts/light_cuts.h). docs/decisions/0002-packet-lightcuts.md
+#include <memory>
+
+#include "core/parallel.h"
+#include "core/rng.h"
+#include "integrators/integrator.h"
+#include "integrators/lightcuts/light_cuts.h"
+
+namespace lumicut {
+
+namespace {
+
+// Share of the `error` parameter that bounds one cluster. docs/integrators/README.md compares it with other methods.
+constexpr float kClusterShare = 0.75f;
+
+class Lightcuts final : public Integrator {
+ public:
+  void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
+    scene_ = &scene;
+    const float clamp = clamp_distance(params, scene);
+    clamp2_ = clamp * clamp;
+    error_ = kClusterShare * static_cast<float>(params.real("error"));
+    const auto limit = params.integer("max_cut");
+    max_cut_ = limit == 0 ? std::numeric_limits<uint32_t>::max() : static_cast<uint32_t>(limit);
+    seed_ = static_cast<uint64_t>(params.integer("seed"));
+    const PhaseTimer timer(context.stats, "light tree");
+    tree_ = LightTree::build(vpls.lights,
+                             {LightTree::method_of(params.choice("tree")), 2.0f * scene.radius(),
+                              static_cast<uint32_t>(params.integer("representatives")), seed_},
+                             context.progress);
+    context.stats.set_value("light_tree_bytes", static_cast<double>(tree_.bytes()));
+  }
+
+  void shade(const ShadePoints& points, std::span<Rgb> radiance, std::span<PointCounts> counts,
+             ShadeContext context) const override {
+    parallel_chunks(points.size(), 4 * kCutPoints, [&](size_t begin, size_t end) {
+      const auto cuts = std::make_unique<LightCuts>();
+      Counters total;
+      for (size_t first = begin; first < end; first += kCutPoints) {
+        if (context.progress.cancelled()) return;
+        const size_t count = std::min(kCutPoints, end - first);
+        CutOptions options{clamp2_, error_, max_cut_, 0, &context.progress};
+        if (tree_.slot_count() > 1)
+          options.slot = Rng(seed_, Stage::representative, points.pixel[first], first).next_below(tree_.slot_count());
+        cuts->grow(tree_, scene_->accel(), options, points, first, count);
+        for (size_t i = 0; i < count; ++i) {
+          const size_t g = i / kLanes, k = i % kLanes;
+          radiance[first + i] = {cuts->radiance[0][g][k], cuts->radiance[1][g][k], cuts->radiance[2][g][k]};
+          const PointCounts c = {cuts->clusters[g][k], cuts->rays[g][k], cuts->bounds[g][k]};
+          if (!counts.empty()) counts[first + i] = c;
+          total.clusters += c.clusters, total.rays += c.rays, total.bounds += c.bounds;
+        }
+        total.points += count;
+      }
+      context.stats.add(total);
+    });
+    context.progress.check();
+  }
+
+ private:
+  const Scene* scene_ = nullptr;
+  LightTree tree_;
+  float clamp2_ = 0.0f, error_ = 0.02f;
+  uint32_t max_cut_ = 0;
+  uint64_t seed_ = 1;
+};
+
+std::vector<ParamInfo> params() {
+  return {
+      {"error", "Error",
+       "Three quarters of it bound each cluster, as a share of the point's radiance; it is no bound of the pixel's "
+       "error",
+       "of the radiance", ParamType::real, "0.02", 0, 1},
+      {"max_cut", "Largest cut", "Most clusters a point may use; 0: no limit", "clusters", ParamType::integer, "0", 0,
+       1e9},
+      {"representatives", "Representatives",
+       "Choices of representative lights that blocks of points draw from: 1 gives the smoothest image, more turn "
+       "banding into noise",
+       "", ParamType::integer, "1", 1, 64},
+      {"tree", "Light tree",
+       "How the lights are clustered: agglomerative makes the smallest cuts, the others are baselines", "",
+       ParamType::choice, "agglomerative", 0, 0, "agglomerative|divisive_3d|divisive_6d"},
+  };
+}
+
+}  // namespace
+
+extern const IntegratorEntry lightcuts_integrator;
+const IntegratorEntry lightcuts_integrator = {
+    "lightcuts",
+    "Lightcuts",
+    "A cut through the light tree for each point, with an error bound for each cluster",
+    "Walter et al. 2005; Walter et al. 2008, sec. 5",
+    params,
+    []() -> std::unique_ptr<Integrator> { return std::make_unique<Lightcuts>(); }};
+
+}  // namespace lumicut

@@ -1,0 +1,129 @@
+// All that emits in a scene, as one distribution: chosen by power, sampled in position and direction. [Keller 1997]
+#pragma once
+
+#include <vector>
+
+#include "core/progress.h"
+#include "core/rng.h"
+#include "lights/vpl.h"
+#include "scene/scene.h"
+
+namespace lumicut {
+
+// Discrete distribution by inverted cumulative sums. pmf(i) is what sample() draws with.
+class DiscreteDistribution {
+ public:
+  DiscreteDistribution() = default;
+  explicit DiscreteDistribution(const std::vector<double>& weights);
+  bool empty() const { return !(total_ > 0.0); }
+  double total() const { return total_; }
+  size_t size() const { return cdf_.empty() ? 0 : cdf_.size() - 1; }
+  // u in [0,1). Never an index of weight 0.
+  size_t sample(double u) const;
+  // The same among entries [first, last) alone, whose sum must be above 0; `rest`: where u fell within the entry.
+  size_t sample(double u, size_t first, size_t last, double& rest) const;
+  double sum(size_t first, size_t last) const { return cdf_[last] - cdf_[first]; }
+  size_t bytes() const { return cdf_.capacity() * sizeof(double); }
+  double pmf(size_t i) const { return (cdf_[i + 1] - cdf_[i]) / total_; }
+
+ private:
+  std::vector<double> cdf_;
+  double total_ = 0.0;
+};
+
+// Where a light path starts.
+struct EmittedRay {
+  Vec3f origin, direction;  // unit
+  Rgb flux{};               // W that the path carries, already divided by its probability
+  uint32_t group = 0;
+};
+
+// A virtual light that stands for emitters that are not points.
+struct DirectSample {
+  Vpl vpl;
+  bool seen_by_rays = false;  // paths may find it too: a mesh, the environment, a rectangle or disk [lamp_surfaces.h]
+  bool on_mesh = false;
+  double density = 0.0;  // of what rays find: for each unit of area, or for each steradian of the environment
+};
+
+// Radiance of a rectangle or disk at the cosine to its axis, above 0.
+Rgb lamp_radiance(const Light& light, float cosine);
+
+class LightSampler {
+ public:
+  // Throws Error(cancelled) where `progress` is.
+  explicit LightSampler(const Scene& scene, const Progress* progress = nullptr);
+  bool empty() const { return power_.empty(); }
+
+  // Lamps without extent: one VPL each, exactly.
+  const std::vector<Vpl>& delta_lights() const { return delta_; }
+  // True where some emitter beside the environment has extent, and so needs many VPLs for its direct light.
+  bool has_extended() const { return extended_ < sampler_.size(); }
+  // One of `count` VPLs that stand for these emitters' direct light; `u` in [0,1) chooses the emitter by power.
+  Vpl sample_direct(double u, uint64_t count, Rng& rng) const;
+  // True where some mesh emits.
+  bool has_meshes() const { return has_meshes_; }
+  bool has_environment() const { return environment_share_ > 0.0; }
+  // Of the power of environment and extended emitters.
+  double environment_share() const { return environment_share_; }
+  // VPL i of `count` that stand for the environment: stratified over its importance (a Hammersley set, jittered,
+  // through the map's row and column distributions).
+  Vpl environment_light(uint64_t i, uint64_t count, uint64_t seed) const;
+  EmittedRay sample_ray(Rng& rng) const;
+  // One VPL that stands for the direct light of environment and extended emitters, where there are any.
+  DirectSample sample_light(Rng& rng) const;
+  // A lamp of the scene (no sun) as one virtual light: a sample of where it emits, exact where it has no extent.
+  Vpl sample_lamp(uint32_t lamp, Rng& rng) const;
+  // Density with which sample_light draws a place on an emissive mesh, on a rectangle or disk, for each unit of area, and
+  // a direction towards the environment, for each steradian.
+  double mesh_density(const SurfaceHit& surface) const;
+  double lamp_density(uint32_t lamp) const;
+  double environment_density(const Vec3f& towards) const;
+  // Emitted by all, W of luminance.
+  double power() const { return power_.total(); }
+  size_t bytes() const;
+
+ private:
+  enum class Kind : uint8_t { point, spot, profile, sphere, rectangle, disk, sun, environment, triangle };
+  struct Emitter {
+    Kind kind;
+    uint32_t index;     // lamp, or mesh
+    uint32_t instance;  // triangle
+    uint32_t triangle;
+  };
+  struct Surface {  // a sampled point of an emitting surface
+    Vec3f position, normal;
+    Rgb radiance;
+    float area_pdf;
+  };
+
+  void add_lamps(std::vector<double>& weights, const Progress* progress);
+  double environment_power(const Progress* progress);
+  void add_triangles(std::vector<double>& weights, const Progress* progress);
+  Surface sample_surface(const Emitter& e, Rng& rng) const;
+  // A sample of an emitter with extent as a virtual light that stands for `weight` of it; a sun's has no area_pdf: 0.
+  Vpl extended_light(const Emitter& e, float weight, Rng& rng, float& area_pdf) const;
+  // Of sample_light: density of a place whose emission has this luminance on average.
+  double area_density(double emission) const;
+  // Direction towards the environment, its radiance and density per steradian, from u and v in [0,1).
+  Vec3f sample_environment(double u, double v, Rgb& radiance, float& pdf) const;
+  // Direction in which light of a sun travels.
+  Vec3f sample_sun(const Light& light, Rng& rng) const;
+  EmittedRay distant_ray(const Vec3f& travel, const Rgb& irradiance, Rng& rng) const;
+  Vec3f offset(const Surface& s) const { return s.position + s.normal * scene_.epsilon(); }
+
+  const Scene& scene_;
+  // Those without extent, the environment, and from extended_ on those that need VPLs: one distribution of them all.
+  std::vector<Emitter> sampler_;
+  size_t extended_ = 0;
+  double environment_share_ = 0.0;
+  bool has_meshes_ = false;
+  DiscreteDistribution power_;
+  std::vector<Vpl> delta_;
+  // Environment: density over texels, rows weighted by the sine of the polar angle.
+  DiscreteDistribution texels_;
+  // Mean luminance that a triangle with a texture emits, by mesh; empty for meshes without.
+  std::vector<std::vector<float>> textured_;
+};
+
+}  // namespace lumicut

@@ -1,0 +1,172 @@
+// Light tracing: lamps, emissive meshes and environment → VPLs. [Keller 1997; Walter et al. 2005 sec. 5; thesis ch. 1]
+// Departs: emitters are chosen by power, and flux is divided by the number of light paths that were started (dividing
+// by the number of VPLs, as some codes do, halves the indirect light of a closed room of albedo ½).
+#include "lights/trace_vpls.h"
+
+#include "lights/light_sampler.h"
+#include "lights/sphere_radii.h"
+#include "scene/scene.h"
+
+namespace lumicut {
+
+namespace {
+
+constexpr size_t kPathsPerChunk = 1024;
+
+struct LightPath {
+  Vec3f origin, direction;
+  Rgb flux{};
+  uint32_t group = 0;
+  Rng rng;
+};
+
+// A VPL with the light path it came from, to keep the order of paths whatever the order of work.
+struct PathVpl {
+  uint64_t path;
+  Vpl vpl;
+};
+
+// Follows paths [first, last) in step, so that rays are traced in batches.
+std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
+                                 uint64_t first, uint64_t last) {
+  std::vector<PathVpl> vpls;
+  std::vector<LightPath> paths;
+  std::vector<uint64_t> ids;
+  for (uint64_t i = first; i < last; ++i) {
+    Rng rng(options.seed, Stage::light_path, i);
+    const EmittedRay e = emitters.sample_ray(rng);
+    if (!(max_component(e.flux) > 0.0f)) continue;
+    paths.push_back({e.origin, e.direction, e.flux, e.group, rng});
+    ids.push_back(i);
+  }
+  std::vector<RayHit> rays;
+  for (uint32_t depth = 0; depth < options.max_depth && !paths.empty(); ++depth) {
+    rays.assign(paths.size(), {});
+    for (size_t i = 0; i < paths.size(); ++i) rays[i].ray.org = paths[i].origin, rays[i].ray.dir = paths[i].direction;
+    scene.accel().intersect(rays);
+    size_t alive = 0;
+    for (size_t i = 0; i < paths.size(); ++i) {
+      if (rays[i].hit.geom == kNoId) continue;
+      LightPath path = paths[i];
+      const SurfaceInteraction at = scene.interaction(rays[i]);
+      Vpl light;
+      light.position = at.position, light.kind = VplKind::oriented, light.normal = at.bsdf.normal();
+      light.group = path.group;
+      light.intensity = at.bsdf.lambertian_intensity(path.flux);
+      if (max_component(light.intensity) > 0.0f && is_finite(light.intensity)) vpls.push_back({ids[i], light});
+      const auto next = at.bsdf.scatter(path.rng);
+      if (!next) continue;
+      path.origin = at.bsdf.origin(next->flags), path.direction = next->direction;
+      path.flux = path.flux * next->weight * next->factor;
+      if (!(max_component(path.flux) > 0.0f) || !is_finite(path.flux)) continue;
+      paths[alive] = path;
+      ids[alive++] = ids[i];
+    }
+    paths.erase(paths.begin() + static_cast<ptrdiff_t>(alive), paths.end());
+    ids.resize(alive);
+  }
+  std::stable_sort(vpls.begin(), vpls.end(), [](const PathVpl& a, const PathVpl& b) { return a.path < b.path; });
+  return vpls;
+}
+
+void trace_indirect(const Scene& scene, const LightSampler& emitters, const VplOptions& options, uint64_t wanted,
+                    Progress& progress, VplSet& set) {
+  // Rounds whose size depends on counts alone, never on threads; the last path kept is the one that fills the budget.
+  const uint64_t most_paths = std::max<uint64_t>(wanted * 16, 65536);
+  std::vector<PathVpl> vpls;
+  uint64_t paths = 0;
+  while (vpls.size() < wanted && paths < most_paths) {
+    progress.check();
+    const uint64_t missing = wanted - vpls.size();
+    const double per_path =
+        vpls.empty() ? 1.0 : std::max(0.05, static_cast<double>(vpls.size()) / static_cast<double>(paths));
+    const uint64_t round = std::min(
+        most_paths - paths,
+        std::max<uint64_t>(kPathsPerChunk, static_cast<uint64_t>(static_cast<double>(missing) / per_path) + 1));
+    const size_t chunks = (round + kPathsPerChunk - 1) / kPathsPerChunk;
+    std::vector<std::vector<PathVpl>> parts(chunks);
+    tbb::parallel_for(size_t{0}, chunks, [&](size_t c) {
+      if (progress.cancelled()) return;
+      parts[c] = trace_paths(scene, emitters, options, paths + c * kPathsPerChunk,
+                             paths + std::min<uint64_t>(round, (c + 1) * kPathsPerChunk));
+      progress.advance(parts[c].size());
+    });
+    progress.check();
+    for (const auto& part : parts) vpls.insert(vpls.end(), part.begin(), part.end());
+    paths += round;
+  }
+  if (vpls.size() > wanted) {
+    // Whole paths only; those after the last one kept were never started, as far as the estimate goes.
+    const uint64_t last = vpls[wanted - 1].path;
+    const auto end = std::find_if(vpls.begin() + static_cast<ptrdiff_t>(wanted), vpls.end(),
+                                  [&](const PathVpl& v) { return v.path != last; });
+    if (end != vpls.end()) paths = last + 1;
+    vpls.erase(end, vpls.end());
+  }
+  const float normalise = 1.0f / static_cast<float>(paths);
+  for (PathVpl& v : vpls) {
+    v.vpl.intensity = v.vpl.intensity * normalise;
+    set.lights.push_back(v.vpl);
+  }
+  set.light_paths = paths;
+}
+
+}  // namespace
+
+VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progress) {
+  progress.begin("light paths", options.count);
+  VplSet set;
+  const LightSampler emitters(scene, &progress);
+  if (emitters.empty()) return set;
+  set.lights = emitters.delta_lights();
+  const uint64_t budget = options.count > set.lights.size() ? options.count - set.lights.size() : 0;
+  if (emitters.has_extended() || emitters.has_environment()) {
+    const double share = options.max_depth > 0 ? options.direct_share : 1.0;
+    auto direct = std::max<uint64_t>(1, static_cast<uint64_t>(share * static_cast<double>(budget)));
+    uint64_t environment = 0;
+    if (emitters.has_environment()) {
+      environment =
+          options.environment_count > 0
+              ? std::min<uint64_t>(options.environment_count, budget)
+              : static_cast<uint64_t>(std::lround(emitters.environment_share() * static_cast<double>(direct)));
+      environment = std::max<uint64_t>(1, environment);
+      // Given their number, the rest share what is left; by power, they share with the environment.
+      if (options.environment_count > 0)
+        direct = static_cast<uint64_t>(share * static_cast<double>(budget - std::min(budget, environment)));
+      else
+        direct -= std::min(direct, environment);
+      direct = emitters.has_extended() ? std::max<uint64_t>(1, direct) : 0;
+    }
+    for (uint64_t i = 0; i < environment; ++i) {
+      if (i % 4096 == 0) progress.check();
+      const Vpl v = emitters.environment_light(i, environment, options.seed);
+      if (max_component(v.intensity) > 0.0f && is_finite(v.intensity)) set.lights.push_back(v);
+    }
+    for (uint64_t i = 0; i < direct; ++i) {
+      if (i % 4096 == 0) progress.check();
+      Rng rng(options.seed, Stage::light_path, i, 1);
+      const Vpl v = emitters.sample_direct((static_cast<double>(i) + rng.next_float()) / static_cast<double>(direct),
+                                           direct, rng);
+      if (max_component(v.intensity) > 0.0f && is_finite(v.intensity)) set.lights.push_back(v);
+    }
+    progress.advance(direct + environment);
+  }
+  const uint64_t indirect = options.count > set.lights.size() ? options.count - set.lights.size() : 0;
+  if (indirect > 0 && options.max_depth > 0 && !scene.bounds().empty()) {
+    const size_t first = set.lights.size();
+    trace_indirect(scene, emitters, options, indirect, progress, set);
+    if (options.sphere_scale > 0.0f)
+      make_spheres(std::span(set.lights).subspan(first), options.sphere_scale, scene.radius(), &progress);
+    progress.check();
+  }
+  return set;
+}
+
+VplSet off_surfaces(const VplSet& set, const Scene& scene) {
+  VplSet moved = set;
+  for (Vpl& v : moved.lights)
+    if (v.kind == VplKind::oriented || v.kind == VplKind::sphere) v.position += v.normal * scene.epsilon();
+  return moved;
+}
+
+}  // namespace lumicut

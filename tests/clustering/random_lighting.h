@@ -1,0 +1,84 @@
+// Random points, lights and clusters of every kind and size.
+#pragma once
+
+#include "lights/light_profile.h"
+#include "lights/vpl.h"
+#include "tests/support/test_scenes.h"
+
+namespace lumicut::test {
+
+inline SurfacePoint random_surface(Rng& rng, float half, bool glossy) {
+  SurfacePoint p;
+  p.position = random_point(rng, half);
+  p.normal = random_direction(rng);
+  p.mirror = random_direction(rng);
+  if (dot(p.mirror, p.normal) < 0) p.mirror = -p.mirror;
+  p.diffuse = {rng.next_float() * 0.3f, rng.next_float() * 0.3f, rng.next_float() * 0.3f};
+  if (glossy && rng.next_float() < 0.8f) {
+    p.exponent = std::pow(1000.0f, rng.next_float());
+    p.specular = Rgb{rng.next_float(), rng.next_float(), rng.next_float()} *
+                 cosine_lobe_scale(rng.next_below(2) == 0, p.exponent);
+    if (rng.next_below(2) == 0) {
+      p.alpha = std::pow(0.01f, rng.next_float());
+      p.specular = {rng.next_float(), rng.next_float(), rng.next_float()};
+      p.grazing = {rng.next_float(), rng.next_float(), rng.next_float()}, p.falloff = rng.next_float();
+    }
+    if (rng.next_below(4) == 0) p.diffuse = {};
+  }
+  return p;
+}
+
+inline ShadePoints random_points(Rng& rng, size_t n, float half, bool glossy) {
+  ShadePoints points;
+  for (size_t i = 0; i < n; ++i) points.push(random_surface(rng, half, glossy));
+  points.finish();
+  return points;
+}
+
+inline Vpl random_light(Rng& rng, VplKind kind, float half) {
+  Vpl v;
+  v.kind = kind;
+  v.position = random_point(rng, half);
+  v.normal = kind == VplKind::omni ? Vec3f{} : random_direction(rng);
+  v.intensity = {rng.next_float(), rng.next_float(), rng.next_float()};
+  if (kind == VplKind::sphere) v.cos_outer = std::pow(10.0f, 0.3f - 2.3f * rng.next_float());
+  if (kind == VplKind::spot) {
+    v.cos_outer = 1.6f * rng.next_float() - 0.8f;
+    v.blend_cosine = rng.next_below(3) == 0 ? 0.0f : (1.0f - v.cos_outer) * rng.next_float();
+    v.spot_cosine = static_cast<float>(rng.next_below(2));
+    v.spread_tan = rng.next_below(2) == 0 ? 0.0f : 4.0f * rng.next_float();
+    if (v.spread_tan > 0) v.spot_cosine = 1.0f;
+    if (rng.next_below(3) == 0) {
+      static const ProfileRef kProfiles[2] = {
+          keep_profile(LightProfile({0.0f, 0.7f, 1.1f, 3.1f}, {0.0f}, {1.0f, 3.0f, 0.5f, 0.1f})),
+          keep_profile(LightProfile({0.0f, 0.5f, 1.0f, 1.5f}, {0.0f, 1.5f, 4.0f, 6.2831853f},
+                                    {1, 2, 1, 0, 1, 0, 3, 0, 1, 4, 0, 0, 1, 2, 1, 0}))};
+      v.profile = kProfiles[rng.next_below(2)]->id();
+      const Vec3f tangent = Frame(v.normal).t;
+      v.cos_outer = find_profile(v.profile)->cos_outer();
+      v.blend_cosine = tangent.x, v.spot_cosine = tangent.y, v.spread_tan = tangent.z;
+    }
+  }
+  return v;
+}
+
+// Lights gathered around a place and a direction, from tight to everywhere.
+inline std::vector<Vpl> random_cluster(Rng& rng, VplKind kind, size_t n) {
+  const Vec3f center = random_point(rng, 1.5f), axis = random_direction(rng);
+  const float spread = std::pow(10.0f, -3.0f * rng.next_float()),
+              turn = std::pow(10.0f, 0.5f - 3.0f * rng.next_float());
+  std::vector<Vpl> lights;
+  for (size_t i = 0; i < n; ++i) {
+    Vpl v = random_light(rng, kind, 1.0f);
+    v.position = center + v.position * spread;
+    if (kind != VplKind::omni) v.normal = normalize(axis + random_direction(rng) * turn);
+    if (v.profile != 0) {
+      const Vec3f tangent = Frame(v.normal).t;
+      v.blend_cosine = tangent.x, v.spot_cosine = tangent.y, v.spread_tan = tangent.z;
+    }
+    lights.push_back(v);
+  }
+  return lights;
+}
+
+}  // namespace lumicut::test
