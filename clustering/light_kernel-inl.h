@@ -24,7 +24,7 @@ HWY_INLINE V SpotFalloff(D d, const Vpl& light, const V3& light_normal, const V3
     return hn::Load(d, x);
   }
   const V c = hn::Neg(Dot(light_normal, to_light)), one = hn::Set(d, 1.0f);
-  const V outer = hn::Set(d, light.cos_outer);
+  const V outer = hn::Set(d, light.cos_outer());
   V x = light.blend_cosine > 0.0f ? hn::Mul(hn::Sub(c, outer), hn::Set(d, 1.0f / light.blend_cosine))
                                   : hn::IfThenElse(hn::Gt(c, outer), one, zero);
   x = hn::Min(one, hn::Max(zero, x));

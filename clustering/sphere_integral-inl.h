@@ -33,7 +33,7 @@ struct SphereCone {
 };
 
 HWY_INLINE SphereCone ConeOfSphere(D d, const Vpl& light, const V3& position, const V3& normal) {
-  const V one = hn::Set(d, 1.0f), two = hn::Set(d, 2.0f), r2 = hn::Set(d, light.radius * light.radius);
+  const V one = hn::Set(d, 1.0f), two = hn::Set(d, 2.0f), r2 = hn::Set(d, light.radius() * light.radius());
   const V3 center = Set3(d, light.position);
   const V3 v{hn::Sub(center.x, position.x), hn::Sub(center.y, position.y), hn::Sub(center.z, position.z)};
   const V dist2 = hn::Max(Dot(v, v), hn::Set(d, 1e-30f)), inverse = hn::Div(one, hn::Sqrt(dist2));

@@ -119,7 +119,7 @@ class IlluminationCut final : public Integrator {
     // The profile of a spot is bent too much for means.
     if (node.kind == VplKind::spot) return r;
     r.shining.position = mean.place;
-    if (node.kind == VplKind::sphere) r.shining.radius = mean.radius;
+    if (node.kind == VplKind::sphere) r.shining.radius() = mean.radius;
     if (node.kind == VplKind::oriented || node.kind == VplKind::sphere)
       r.shining.normal = mean.direction, r.scatter = &mean.scatter;
     return r;
@@ -166,7 +166,7 @@ class IlluminationCut final : public Integrator {
       Mean& mean = means_[n];
       if (node.leaf()) {
         const Vpl& light = tree_.lights()[node.light];
-        mean = {light.position, light.normal, {}, node.light, light.kind == VplKind::sphere ? light.radius : 0.0f};
+        mean = {light.position, light.normal, {}, node.light, light.kind == VplKind::sphere ? light.radius() : 0.0f};
         continue;
       }
       const uint32_t left = node.first_child, right = left + 1;

@@ -59,7 +59,7 @@ bool narrowed(const Light& light) {
 Vpl spot_of(const Light& l) {
   Vpl v;
   v.kind = VplKind::spot, v.position = l.position, v.normal = l.direction, v.intensity = l.value, v.group = l.group;
-  v.cos_outer = l.cos_outer, v.blend_cosine = l.blend_cosine, v.spot_cosine = l.spot_cosine ? 1.0f : 0.0f;
+  v.cos_outer() = l.cos_outer, v.blend_cosine = l.blend_cosine, v.spot_cosine = l.spot_cosine ? 1.0f : 0.0f;
   return v;
 }
 
@@ -67,7 +67,7 @@ Vpl spot_of(const Light& l) {
 Vpl profiled(const Light& l, const LightProfile& profile) {
   Vpl v;
   v.kind = VplKind::spot, v.position = l.position, v.normal = l.direction, v.intensity = l.value, v.group = l.group;
-  v.profile = l.profile, v.cos_outer = profile.cos_outer();
+  v.profile = l.profile, v.cos_outer() = profile.cos_outer();
   v.blend_cosine = l.tangent.x, v.spot_cosine = l.tangent.y, v.spread_tan = l.tangent.z;
   return v;
 }
@@ -75,7 +75,7 @@ Vpl profiled(const Light& l, const LightProfile& profile) {
 // ∫ profile dω by the midpoint rule over the cosine: smooth, 1024 cells are exact to 1e-6.
 double profile_solid_angle(const Vpl& spot) {
   constexpr int kCells = 1024;
-  const double lo = std::max(-1.0f, spot.cos_outer), width = 1.0 - lo;
+  const double lo = std::max(-1.0f, spot.cos_outer()), width = 1.0 - lo;
   double sum = 0.0;
   for (int i = 0; i < kCells; ++i) sum += spot_falloff(spot, static_cast<float>(lo + width * (i + 0.5) / kCells));
   return 2.0 * std::numbers::pi * width * sum / kCells;

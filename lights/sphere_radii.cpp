@@ -23,7 +23,7 @@ void make_spheres(std::span<Vpl> lights, float scale, float scene_radius, const 
       const size_t found = tree.nearest(&places[3 * i], index.size(), index.data(), dist2.data(), scratch);
       const float distance = found == index.size() ? static_cast<float>(std::sqrt(dist2.back())) : largest;
       lights[i].kind = VplKind::sphere;
-      lights[i].radius = scale * std::clamp(distance, least, largest);
+      lights[i].radius() = scale * std::clamp(distance, least, largest);
     }
   });
 }

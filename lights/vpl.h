@@ -20,25 +20,28 @@ struct Vpl {
   Vec3f normal{};  // unit; directional: the way light travels; spot: axis; omni: 0
   uint32_t group = 0;
   Rgb intensity{};  // W/sr along the normal; directional: irradiance W/m²
-  union {
-    float cos_outer = 0.0f;  // spot
-    float radius;            // sphere: above 0
-  };
+  float edge_or_radius = 0.0f;                    // spot: cos_outer(); sphere: radius()
   float blend_cosine = 0.0f, spot_cosine = 0.0f;  // spot
   float spread_tan = 0.0f;  // spot: narrowed area lamps fall off with max(0, 1 − spread_tan·tanθ)
   // Spot: id of a LightProfile [lights/light_profile.h] in place of the falloff above; then blend_cosine, spot_cosine and
   // spread_tan are the unit vector where its horizontal angle 0 lies, and intensity is that of its largest value.
   uint32_t profile = 0;
-  LUMICUT_FIELDS(Vpl, position, kind, normal, group, intensity, cos_outer, blend_cosine, spot_cosine, spread_tan,
+  LUMICUT_FIELDS(Vpl, position, kind, normal, group, intensity, edge_or_radius, blend_cosine, spot_cosine, spread_tan,
                  profile)
 
+  // Spot: the cosine at which it has fallen to 0.
+  float cos_outer() const { return edge_or_radius; }
+  float& cos_outer() { return edge_or_radius; }
+  // Sphere: above 0.
+  float radius() const { return edge_or_radius; }
+  float& radius() { return edge_or_radius; }
   Vec3f tangent() const { return {blend_cosine, spot_cosine, spread_tan}; }
 };
 static_assert(sizeof(Vpl) == 64);
 
 // Share of a spot's intensity at cosine `c` to its axis. The SIMD counterpart is in clustering/light_kernel-inl.h.
 inline float spot_falloff(const Vpl& v, float c) {
-  float x = v.blend_cosine > 0.0f ? (c - v.cos_outer) / v.blend_cosine : (c > v.cos_outer ? 1.0f : 0.0f);
+  float x = v.blend_cosine > 0.0f ? (c - v.cos_outer()) / v.blend_cosine : (c > v.cos_outer() ? 1.0f : 0.0f);
   x = std::min(1.0f, std::max(0.0f, x));
   x = x * x * (3.0f - 2.0f * x);
   if (v.spot_cosine > 0.0f) x *= std::max(0.0f, c);

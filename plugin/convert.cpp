@@ -401,17 +401,17 @@ VplSet to_vpls(const lumicut_vpl* lights, uint64_t count) {
       c.finite("blend", tangent);
       if (std::abs(length(vec_double(tangent)) - 1.0) > 1e-2 || std::abs(dot(vec(tangent), vpl.normal)) > 1e-2f)
         c.fail("blend", "with spot_cosine and spread_tan is no unit vector orthogonal to the normal");
-      vpl.cos_outer = in.cos_outer, vpl.profile = in.profile;
+      vpl.cos_outer() = in.cos_outer, vpl.profile = in.profile;
       vpl.blend_cosine = in.blend, vpl.spot_cosine = in.spot_cosine, vpl.spread_tan = in.spread_tan;
     } else if (vpl.kind == VplKind::sphere) {
       c.range("cos_outer", in.cos_outer, std::numeric_limits<float>::min(), kLargestCoordinate);
-      vpl.radius = in.cos_outer;
+      vpl.radius() = in.cos_outer;
     } else if (vpl.kind == VplKind::spot) {
       c.range("cos_outer", in.cos_outer, -1.0f, 1.0f);
       c.range("blend", in.blend, 0.0f, 2.0f);
       c.range("spot_cosine", in.spot_cosine, 0.0f, 1.0f);
       c.not_negative("spread_tan", in.spread_tan);
-      vpl.cos_outer = in.cos_outer, vpl.blend_cosine = in.blend, vpl.spot_cosine = in.spot_cosine;
+      vpl.cos_outer() = in.cos_outer, vpl.blend_cosine = in.blend, vpl.spot_cosine = in.spot_cosine;
       vpl.spread_tan = in.spread_tan;
     }
   }

@@ -26,7 +26,7 @@ uint64_t spread_bits(uint64_t x) {
 // How unlike two lights shine: the distance of their normals; more than any such where they are of different make.
 float unlike2(const Vpl& a, const Vpl& b) {
   if (a.kind == VplKind::sphere && b.kind == VplKind::sphere) return length2(a.normal - b.normal);
-  if (a.kind != b.kind || a.cos_outer != b.cos_outer || a.blend_cosine != b.blend_cosine ||
+  if (a.kind != b.kind || a.edge_or_radius != b.edge_or_radius || a.blend_cosine != b.blend_cosine ||
       a.spot_cosine != b.spot_cosine || a.spread_tan != b.spread_tan)
     return 9.0f;
   return length2(a.normal - b.normal);
@@ -44,12 +44,12 @@ Vpl mean_light(std::span<const Vpl> lights, const std::vector<uint8_t>& group_of
       position[k] += w * v.position[k], normal[k] += w * v.normal[k],
           intensity[k] += static_cast<double>(v.intensity[k]);
     }
-    radius += w * v.cos_outer;
+    radius += w * v.radius();
     total += w;
     if (strongest == nullptr || luminance(v.intensity) > luminance(strongest->intensity)) strongest = &v;
   }
   Vpl out = *strongest;
-  if (out.kind == VplKind::sphere) out.radius = static_cast<float>(radius / total);
+  if (out.kind == VplKind::sphere) out.radius() = static_cast<float>(radius / total);
   const double length_of_normal = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
   for (int k = 0; k < 3; ++k) {
     out.position[k] = static_cast<float>(position[k] / total);
@@ -176,7 +176,7 @@ void WspdTree::find_balls(Progress& progress) {
       for (uint32_t i = node.first; i < node.last; ++i) {
         box.extend(place(i));
         power += static_cast<double>(luminance(lights_[i].intensity));
-        if (lights_[i].kind == VplKind::sphere) node.largest_sphere = std::max(node.largest_sphere, lights_[i].radius);
+        if (lights_[i].kind == VplKind::sphere) node.largest_sphere = std::max(node.largest_sphere, lights_[i].radius());
       }
       node.center = node.last - node.first == 1 ? place(node.first) : box.center();
       float radius2 = 0.0f;
@@ -514,7 +514,7 @@ void WspdTree::check() const {
   const auto light = [&](const Vpl& v) {
     return static_cast<uint32_t>(v.kind) < kVplKinds && is_finite(v.position) && is_finite(v.normal) &&
            positive(v.intensity.x) && positive(v.intensity.y) && positive(v.intensity.z) &&
-           std::isfinite(v.cos_outer) && std::isfinite(v.blend_cosine) && std::isfinite(v.spot_cosine) &&
+           std::isfinite(v.edge_or_radius) && std::isfinite(v.blend_cosine) && std::isfinite(v.spot_cosine) &&
            std::isfinite(v.spread_tan) && (v.profile == 0 || find_profile(v.profile) != nullptr);
   };
   require(is_finite(cube_.lower) && positive(cube_.side) && cube_.side > 0.0f, "bounds");

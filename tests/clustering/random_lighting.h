@@ -41,10 +41,10 @@ inline Vpl random_light(Rng& rng, VplKind kind, float half) {
   v.position = random_point(rng, half);
   v.normal = kind == VplKind::omni ? Vec3f{} : random_direction(rng);
   v.intensity = {rng.next_float(), rng.next_float(), rng.next_float()};
-  if (kind == VplKind::sphere) v.cos_outer = std::pow(10.0f, 0.3f - 2.3f * rng.next_float());
+  if (kind == VplKind::sphere) v.radius() = std::pow(10.0f, 0.3f - 2.3f * rng.next_float());
   if (kind == VplKind::spot) {
-    v.cos_outer = 1.6f * rng.next_float() - 0.8f;
-    v.blend_cosine = rng.next_below(3) == 0 ? 0.0f : (1.0f - v.cos_outer) * rng.next_float();
+    v.cos_outer() = 1.6f * rng.next_float() - 0.8f;
+    v.blend_cosine = rng.next_below(3) == 0 ? 0.0f : (1.0f - v.cos_outer()) * rng.next_float();
     v.spot_cosine = static_cast<float>(rng.next_below(2));
     v.spread_tan = rng.next_below(2) == 0 ? 0.0f : 4.0f * rng.next_float();
     if (v.spread_tan > 0) v.spot_cosine = 1.0f;
@@ -55,7 +55,7 @@ inline Vpl random_light(Rng& rng, VplKind kind, float half) {
                                     {1, 2, 1, 0, 1, 0, 3, 0, 1, 4, 0, 0, 1, 2, 1, 0}))};
       v.profile = kProfiles[rng.next_below(2)]->id();
       const Vec3f tangent = Frame(v.normal).t;
-      v.cos_outer = find_profile(v.profile)->cos_outer();
+      v.cos_outer() = find_profile(v.profile)->cos_outer();
       v.blend_cosine = tangent.x, v.spot_cosine = tangent.y, v.spread_tan = tangent.z;
     }
   }

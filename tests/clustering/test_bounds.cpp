@@ -108,7 +108,7 @@ TEST(Bounds, OfSpheresAreAboutAsNearAsThoseOfPoints) {
         std::vector<Vpl> lights = test::random_cluster(rng, VplKind::oriented, 6);
         const float radius = 0.02f + 0.2f * rng.next_float();
         for (Vpl& v : lights)
-          if (spheres) v.kind = VplKind::sphere, v.radius = radius * (1.0f + rng.next_float());
+          if (spheres) v.kind = VplKind::sphere, v.radius() = radius * (1.0f + rng.next_float());
         const ShadePoints points = test::random_points(rng, kLanes, 1.5f, glossy);
         PointBlock block;
         block.load(points, 0);
@@ -147,7 +147,7 @@ TEST(Bounds, DoNotDependOnTheScaleOfTheScene) {
       const float s = scaled ? 1024.0f : 1.0f;  // a power of two: no rounding of its own
       if (scaled) {
         for (Vpl& v : lights)
-          v.position = v.position * s, v.cos_outer *= kind == VplKind::sphere ? s : 1.0f,
+          v.position = v.position * s, v.edge_or_radius *= kind == VplKind::sphere ? s : 1.0f,
           v.intensity = v.kind == VplKind::directional ? v.intensity : v.intensity * (s * s);
         for (auto& axis : points.position)
           for (float& x : axis) x *= s;

@@ -17,7 +17,7 @@ struct TrueCone {
   double cosine, geometry;
 };
 TrueCone cone_of(const Vpl& light, const Vec3f& position) {
-  const double d = length(light.position - position), r = light.radius;
+  const double d = length(light.position - position), r = light.radius();
   const double c = d >= r ? std::sqrt(1 - r * r / (d * d)) : -std::sqrt(1 - d * d / (r * r));
   return {c, 2 * (1 - c) / (r * r)};
 }
@@ -59,9 +59,9 @@ void place(Rng& rng, Model model, float sharpness, bool inside, SurfacePoint& p,
   }
   light.kind = VplKind::sphere;
   light.intensity = {1, 1, 1};
-  light.cos_outer = 0.1f + 0.4f * rng.next_float();
-  const float distance = light.radius * (inside ? rng.next_float() : 1.0f + 9.0f * rng.next_float() * rng.next_float());
-  Vec3f to = normalize(p.mirror + test::random_direction(rng) * (1.5f * light.radius / distance));
+  light.radius() = 0.1f + 0.4f * rng.next_float();
+  const float distance = light.radius() * (inside ? rng.next_float() : 1.0f + 9.0f * rng.next_float() * rng.next_float());
+  Vec3f to = normalize(p.mirror + test::random_direction(rng) * (1.5f * light.radius() / distance));
   if (!(dot(to, p.normal) > 0)) to = p.normal;
   light.position = p.position + to * distance;
   light.normal = normalize(test::random_direction(rng) - to);
@@ -113,14 +113,14 @@ TEST(SphereIntegral, OfADiffusePointAboveAllOfASphereIsTheClosedForm) {
   Vpl light;
   light.kind = VplKind::sphere, light.normal = {0, 0, -1}, light.intensity = {1, 1, 1};
   for (const float r : {0.01f, 0.3f, 0.9f, 1.0f}) {
-    light.position = {0, 0, 1}, light.cos_outer = r;
+    light.position = {0, 0, 1}, light.radius() = r;
     const double c = std::sqrt(1 - double{r} * double{r});
     EXPECT_NEAR(light_point(light, light.intensity, 0.0f, p).x, 2 * (1 - c * c * c) / (3 * double{r} * double{r}),
                 1e-4 / (1e-3 + double{r} * double{r}) * 1e-2 + 1e-5)
         << r;
   }
   // At the centre all directions count; those below either horizon give nothing: half of ∫ cos² over the sphere.
-  light.position = p.position, light.cos_outer = 0.5f;
+  light.position = p.position, light.radius() = 0.5f;
   EXPECT_NEAR(light_point(light, light.intensity, 0.0f, p).x, 2.0 / (3 * 0.25), 0.03 * 2.0 / (3 * 0.25));
 }
 
@@ -134,7 +134,7 @@ TEST(SphereIntegral, TendsToThePointLightAsTheSphereShrinks) {
     sphere.kind = VplKind::sphere;
     const Rgb expected = light_point(point, point.intensity, 0.0f, p);
     for (const float share : {2e-3f, 1e-3f, 3e-4f, 1e-4f, 1e-5f, 1e-7f}) {
-      sphere.cos_outer = share * d;
+      sphere.radius() = share * d;
       const Rgb got = light_point(sphere, sphere.intensity, 0.0f, p);
       // Over the cone the sharpest lobe (exponent 1000, α 0.01) varies by some share/0.01 to either side of its mean,
       // and cosines by `share` near the horizon.
@@ -155,7 +155,7 @@ TEST(SphereIntegral, IsContinuousThroughTheSurfaceOfTheSphere) {
     const float d = length(light.position - p.position);
     float value[2];
     for (const int side : {0, 1}) {
-      light.cos_outer = d * (side == 0 ? 0.999999f : 1.000001f);
+      light.radius() = d * (side == 0 ? 0.999999f : 1.000001f);
       value[side] = light_point(light, light.intensity, 0.0f, p).y;
     }
     // The cone's angle grows with the root of the distance to the surface: √(2e-6) to either side of π/2.
@@ -184,7 +184,7 @@ TEST(SphereIntegral, StaysFiniteWhereverTheLightLies) {
   for (const float radius : {1e-20f, 1e-6f, 1.0f, 1e6f}) {
     for (size_t at = 0; at < points.size(); ++at) {
       Vpl light = test::random_light(rng, VplKind::sphere, 1.0f);
-      light.cos_outer = radius;
+      light.radius() = radius;
       if (at % 2 == 0) light.position = points.position_at(at);
       if (at % 4 == 1) light.position = points.position_at(at) + points.get(at).mirror * 0.5f;  // the lobe's own axis
       LitPoints lit;

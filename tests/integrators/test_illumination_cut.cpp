@@ -137,7 +137,7 @@ TEST(IlluminationCut, LightsOfEveryKind) {
     v.kind = static_cast<VplKind>(i % 4);
     v.position = test::random_point(rng, 0.9f);
     if (v.kind != VplKind::omni) v.normal = test::random_direction(rng);
-    if (v.kind == VplKind::spot) v.cos_outer = 0.5f, v.blend_cosine = 0.2f;
+    if (v.kind == VplKind::spot) v.cos_outer() = 0.5f, v.blend_cosine = 0.2f;
     const float power = rng.next_float();
     v.intensity = Rgb{power, power, power} * 0.01f;
     vpls.lights.push_back(v);

@@ -105,7 +105,7 @@ TEST(ColumnMethods, EveryKindOfLightIsClustered) {
     v.position = test::random_point(rng, 0.9f);
     v.normal = v.kind == VplKind::omni ? Vec3f{} : test::random_direction(rng);
     v.intensity = {rng.next_float(), rng.next_float(), rng.next_float()};
-    if (v.kind == VplKind::spot) v.cos_outer = 0.3f, v.blend_cosine = 0.2f;
+    if (v.kind == VplKind::spot) v.cos_outer() = 0.3f, v.blend_cosine = 0.2f;
     vpls.lights.push_back(v);
   }
   const auto reference = test::render(*scene, "exhaustive", vpls, {});

@@ -17,7 +17,7 @@ VplSet lights_of_every_kind(int count) {
     v.position = test::random_point(rng, 0.9f);
     v.normal = v.kind == VplKind::omni ? Vec3f{} : test::random_direction(rng);
     v.intensity = {rng.next_float(), rng.next_float(), rng.next_float()};
-    if (v.kind == VplKind::spot) v.cos_outer = 0.3f, v.blend_cosine = 0.2f;
+    if (v.kind == VplKind::spot) v.cos_outer() = 0.3f, v.blend_cosine = 0.2f;
     vpls.lights.push_back(v);
   }
   return vpls;

@@ -62,7 +62,7 @@ TEST(BlockKernel, EqualsThePlainSumForEveryKindAndCount) {
         if (v.kind != VplKind::omni) v.normal = test::random_direction(rng);
         v.intensity = {rng.next_float(), rng.next_float(), rng.next_float()};
         if (v.kind == VplKind::spot)
-          v.cos_outer = -0.5f, v.blend_cosine = i % 3 == 0 ? 0.0f : 0.4f, v.spot_cosine = i % 3 == 1 ? 1.0f : 0.0f,
+          v.cos_outer() = -0.5f, v.blend_cosine = i % 3 == 0 ? 0.0f : 0.4f, v.spot_cosine = i % 3 == 1 ? 1.0f : 0.0f,
           v.spread_tan = i % 3 == 2 ? 0.7f : 0.0f;
         lights.push_back(v);
       }

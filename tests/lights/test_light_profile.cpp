@@ -95,7 +95,7 @@ TEST(LightProfile, PowerOfALampGoesRoundThroughItsPaths) {
     const Vec3f d = test::random_direction(rng);
     const float share = spot_profile(v, d);
     EXPECT_LE(share, 1.0f);
-    EXPECT_TRUE(dot(d, v.normal) >= v.cos_outer || share == 0.0f);
+    EXPECT_TRUE(dot(d, v.normal) >= v.cos_outer() || share == 0.0f);
   }
   const Vec3f bitangent = cross(v.tangent(), v.normal);
   EXPECT_NEAR(spot_profile(v, -bitangent), 1.0 * 3 / 12, 1e-4) << "90 degrees down, 270 around";

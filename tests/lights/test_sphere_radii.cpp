@@ -27,14 +27,14 @@ TEST(SphereRadii, AreTheDistanceToTheTenthNeighbour) {
     for (const Vec3f& p : places) d.push_back(length(p - places[i]));
     std::nth_element(d.begin(), d.begin() + 10, d.end());  // the nearest is the light itself
     EXPECT_EQ(lights[i].kind, VplKind::sphere);
-    EXPECT_NEAR(lights[i].radius, 0.5f * d[10], 1e-6f);
+    EXPECT_NEAR(lights[i].radius(), 0.5f * d[10], 1e-6f);
   }
 }
 
 TEST(SphereRadii, OfLightsInOnePlaceAreTheLeast) {
   std::vector<Vpl> lights = oriented(std::vector<Vec3f>(40, Vec3f{1, 2, 3}));
   make_spheres(lights, 1.0f, 5.0f);
-  for (const Vpl& v : lights) EXPECT_EQ(v.radius, kLeastSphere * 5.0f);
+  for (const Vpl& v : lights) EXPECT_EQ(v.radius(), kLeastSphere * 5.0f);
 }
 
 TEST(SphereRadii, OfFewerThanElevenLightsAreTheLargest) {
@@ -42,7 +42,7 @@ TEST(SphereRadii, OfFewerThanElevenLightsAreTheLargest) {
     std::vector<Vpl> lights = oriented(std::vector<Vec3f>(n, Vec3f{}));
     for (size_t i = 0; i < n; ++i) lights[i].position.x = 0.01f * static_cast<float>(i);
     make_spheres(lights, 2.0f, 5.0f);
-    for (const Vpl& v : lights) EXPECT_EQ(v.radius, 2.0f * kLargestSphere * 5.0f);
+    for (const Vpl& v : lights) EXPECT_EQ(v.radius(), 2.0f * kLargestSphere * 5.0f);
   }
 }
 

@@ -17,6 +17,12 @@ FrameOptions small_frame() {
   return options;
 }
 
+IterationOptions iterations(uint32_t count, bool checkpoints = false) {
+  IterationOptions options;
+  options.count = count, options.checkpoints = checkpoints;
+  return options;
+}
+
 struct RoomRender {
   explicit RoomRender(const std::string& integrator = "lightcuts")
       : scene(test::make_room()), preparation(*find_integrator(integrator)) {
@@ -45,17 +51,19 @@ struct RoomRender {
 TEST(RenderLoop, IterationsGoOnFromACheckpointToTheSameBits) {
   RoomRender whole, halves;
   RenderLoop::State state;
-  const auto all = whole.render({.count = 4}, 2, &state);
+  const auto all = whole.render(iterations(4), 2, &state);
   EXPECT_EQ(state.iterations, 4u);
   EXPECT_EQ(whole.tiles_done, 4 * 6) << "once a tile and iteration";
   EXPECT_EQ(state.checkpoint, nullptr) << "not asked for";
-  halves.render({.count = 2, .checkpoints = true}, 1, &state);
+  halves.render(iterations(2, true), 1, &state);
   ASSERT_NE(state.checkpoint, nullptr);
-  EXPECT_EQ(halves.render({.count = 4, .resume = *state.checkpoint}, 2), all);
+  IterationOptions rest = iterations(4);
+  rest.resume = *state.checkpoint;
+  EXPECT_EQ(halves.render(std::move(rest), 2), all);
 }
 
 TEST(RenderLoop, ThreadsDoNotChangeTheImage) {
-  EXPECT_EQ(RoomRender().render({.count = 2}, 1), RoomRender().render({.count = 2}, 4));
+  EXPECT_EQ(RoomRender().render(iterations(2), 1), RoomRender().render(iterations(2), 4));
 }
 
 TEST(RenderLoop, PreparationIsReusedUntilSomethingChanges) {
@@ -88,7 +96,9 @@ TEST(RenderLoop, GroupsOfLightAddUpToAllLight) {
   const auto all = one.render({}, 2);
   const std::vector<uint32_t> groups = light_groups(*apart.scene);
   // Each group has a cut of its own, within the method's error of 2 % of the sum.
-  const auto sum = apart.render({.groups = true}, 2, nullptr, groups);
+  IterationOptions by_group;
+  by_group.groups = true;
+  const auto sum = apart.render(std::move(by_group), 2, nullptr, groups);
   double difference = 0, total = 0;
   for (size_t i = 0; i < all.size(); ++i) difference += std::abs(double{all[i]} - sum[i]), total += all[i];
   EXPECT_LT(difference, 0.02 * total);
