@@ -1,4 +1,4 @@
-// Ray tracing behind one interface: our BVH, Embree, or the host's own callbacks.
+// Ray tracing behind one interface. Backends: our BVH, Embree, and the host's own callbacks.
 // Every call is a batch, so that no virtual call is paid per ray. All queries are [shared]: concurrent after build.
 #pragma once
 
@@ -17,7 +17,7 @@ namespace lumicut {
 
 inline constexpr uint32_t kNoId = 0xffffffffu;
 
-// What a scene's coordinates keep to: the difference of two is the direction of a ray that every accel takes.
+// Limit of a scene's coordinates: the difference of two is a valid direction in every backend.
 inline constexpr float kLargestCoordinate = 9e17f;
 
 // Fields in Embree's order (RTCRay). `dir` need not be a unit vector; distances are in units of its length.
@@ -47,11 +47,11 @@ struct RayHit {
   Hit hit;
 };
 
-// Cut-outs and what is partly transparent: asked for each candidate hit on a mesh with `has_cutout`. Called concurrently.
+// Cut-outs and partial transparency. Called for each candidate hit on a mesh with `has_cutout`, concurrently.
 class HitFilter {
  public:
   virtual ~HitFilter() = default;
-  // True where the surface lets the ray go on; always the same for the same place.
+  // True where the ray passes through the surface. Must always return the same for the same place.
   virtual bool passes(uint32_t mesh, uint32_t prim, float u, float v) const = 0;
 };
 
@@ -78,10 +78,10 @@ struct AccelGeometry {
 
 struct AccelOptions {
   bool robust = true;        // watertight on shared edges
-  std::string builder = "";  // "bvh" alone: see build_options_of in accel/bvh_build.h; empty: its default
+  std::string builder = "";  // "bvh" only: see build_options_of in accel/bvh_build.h; empty: its default
 };
 
-// What a build gave. Costs as in [Walter et al. 2008, Fig. 6]; 0 where the accel does not compute them.
+// Statistics of a build. Costs as in [Walter et al. 2008, Fig. 6]; 0 where the backend does not compute them.
 struct AccelInfo {
   uint64_t triangles = 0, nodes = 0, bytes = 0;
   double build_seconds = 0, expected_boxes = 0, expected_tris = 0, expected_cost = 0;
@@ -99,20 +99,20 @@ class Accel {
   // Any hit: sets tfar to -inf where something lies in (tnear, tfar).
   virtual void occluded(std::span<Ray> rays) const = 0;
 
-  // The hot call of the whole project: one light, many nearby points (SoA). Tests the open segments light→point; with
-  // `directional`, `light` is the unit direction towards the light and the ray runs from the point to infinity.
-  // Both ends are expected to be offset from their surfaces already. occluded[i] = 1 where blocked, else 0.
-  // `n` is any number; best in multiples of 16.
+  // The hot call of the renderer: one light, many nearby points (structure of arrays). Tests the open segments
+  // light→point; with `directional`, `light` is the unit direction towards the light and the ray runs from the point to
+  // infinity. Both ends should be offset from their surfaces already. occluded[i] = 1 where blocked, else 0. Fastest
+  // where `n` is a multiple of 16.
   virtual void occluded_from_point(const Vec3f& light, bool directional, const float* px, const float* py,
                                    const float* pz, size_t n, uint8_t* occluded) const = 0;
 };
 
 inline constexpr const char* kDefaultAccel = "bvh";
-// "bvh" or "embree", of a name that a caller gave: "agglomerative" is an earlier one of "bvh". Throws Error on any other.
+// "bvh" or "embree" for the name of a backend; "agglomerative" is an earlier name of "bvh". Throws Error on others.
 std::string accel_kind_of(const std::string& name);
 
-// Makes the accel of that name. Runs on the caller's arena. Throws Error on an unknown
-// name, an index out of range, or a position that is not finite (naming mesh, index and value), and Error(cancelled).
+// Builds the backend of that name, on the caller's arena. Throws Error on an unknown name, an index out of range, or a
+// position that is not finite (naming mesh, index and value), and Error(cancelled).
 std::unique_ptr<Accel> make_accel(const std::string& name, const AccelGeometry& geometry, const AccelOptions& options,
                                   Progress* progress = nullptr);
 

@@ -1,4 +1,4 @@
-// The policies of boxes and of balls.
+// Agglomeration of boxes and of balls: their policies, and the checks of input.
 #include "accel/agglomerate.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -16,7 +16,7 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// d = half the surface area of the joint box. Features: -lo, hi.
+// d = half the surface area of the joint box. [Walter et al. 2008, sec. 4] Features: -lo, hi.
 struct AreaPolicy {
   static constexpr bool kNonDecreasing = true;
   static constexpr int kFeatures = 6;
@@ -46,16 +46,17 @@ struct AreaPolicy {
     return hn::Add(hn::Mul(x, hn::Add(y, z)), hn::Mul(y, z));
   }
 };
+static_assert(agglomeration::ClusterPolicy<AreaPolicy>);
 
-// d = radius of the smallest ball around both: (|c1 - c2| + r1 + r2) / 2, or the greater radius where one holds the
-// other. Features: centre, -centre, radius. Unlike the others, a merged centre may move either way: each feature alone
-// may fall, and the bound still holds, as it takes the least of each feature over clusters that are there. Eq. 1 holds
-// of balls since the ball of A∪C holds the ball of A; rounding could break it, and a merged radius is rounded up to
-// keep it.
+// d = radius of the smallest ball around both: (|c1 - c2| + r1 + r2) / 2, or the greater radius where one ball contains
+// the other. [Omohundro 1989] Features: centre, -centre, radius. Unlike in other policies, features may decrease when
+// clusters merge, since the centre moves. The bound over a node holds all the same: it takes the minima of existing
+// clusters. Eq. 1 holds because the ball of A∪C contains the ball of A; merged radii are rounded up so that it does in
+// floating point too.
 struct BallPolicy {
   static constexpr bool kNonDecreasing = true;
   static constexpr int kFeatures = 0;
-  static constexpr int kOrderDims = 8;  // the first eight dimensions; more would order little better
+  static constexpr int kOrderDims = 8;  // the first eight dimensions; more improve the order little
   int dimension;
   size_t features() const { return static_cast<size_t>(2 * dimension + 1); }
   size_t key_features() const { return features(); }
@@ -65,7 +66,7 @@ struct BallPolicy {
     double dist2 = 0;
     for (int i = 0; i < n; ++i) dist2 += (double{a[i]} - b[i]) * (double{a[i]} - b[i]);
     const double dist = std::sqrt(dist2);
-    // Equal balls are the same from either side: the greater by value, then by features.
+    // If each contains the other, the choice must not depend on the order of a and b.
     const bool a_holds = dist + rb <= ra, b_holds = dist + ra <= rb;
     if (a_holds || b_holds) {
       const bool take_a = a_holds && !(b_holds && std::lexicographical_compare(a, a + 2 * n + 1, b, b + 2 * n + 1));
@@ -76,7 +77,7 @@ struct BallPolicy {
     double reach_a = 0, reach_b = 0;
     for (int i = 0; i < n; ++i) {
       const double along_a = (r - ra) / dist, along_b = (r - rb) / dist;
-      // Symmetric in a and b, so that the order of a merge changes nothing.
+      // Symmetric in a and b.
       const double c = 0.5 * ((a[i] + (double{b[i]} - a[i]) * along_a) + (b[i] + (double{a[i]} - b[i]) * along_b));
       out[i] = static_cast<float>(c);
       out[n + i] = -out[i];
@@ -113,6 +114,7 @@ struct BallPolicy {
     return hn::Max(both, hn::Max(ra, rb));
   }
 };
+static_assert(agglomeration::ClusterPolicy<BallPolicy>);
 
 std::vector<Merge> boxes(std::span<const Aabb> input, float scale, float inflate, Strategy strategy,
                          Progress* progress) {
@@ -167,7 +169,7 @@ std::vector<Merge> agglomerate_boxes(std::span<const Aabb> input, Strategy strat
     all.extend(b);
   }
   const float size = input.empty() ? 0.0f : max_component(all.extent());
-  // A power of two: keeps every digit, and products of three sides in range.
+  // A power of two: exact, and keeps products of sides in range.
   const float scale = size > 1e-30f ? std::exp2(-std::floor(std::log2(size))) : 1.0f;
   return HWY_DYNAMIC_DISPATCH(boxes)(input, scale, 1e-7f, strategy, progress);
 }

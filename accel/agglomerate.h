@@ -1,5 +1,6 @@
-// Bottom-up clustering: one core (accel/agglomerate-inl.h), four strategies, one policy per use. [Walter et al. 2008,
-// sec. 3] Here: the plain types, and the two policies of this folder. The light policy lies in clustering/light_policy.h.
+// Agglomerative clustering, without SIMD types: strategies, results, and the functions for boxes and balls.
+// [Walter et al. 2008, Fast Agglomerative Clustering for Rendering] The core for any policy is accel/agglomerate-inl.h;
+// lights are clustered by clustering/light_policy.h.
 #pragma once
 
 #include <cstddef>
@@ -14,33 +15,31 @@
 namespace lumicut {
 
 enum class Strategy : uint8_t {
-  naive,            // Fig. 2: all pairs, each time. O(N³): the oracle of tests
-  heap,             // Fig. 3: best-match tree and a lazy heap
-  locally_ordered,  // Fig. 4: nearest-neighbour chain, one thread
-  // sec. 3.3's aim by other means: chains at once in regions of space, each of which rests where a best match lies
-  // outside; then in new regions over what is left; the last on one thread. On the caller's arena.
-  parallel,
+  naive,            // all pairs before each merge, O(N³): the oracle of tests. [Fig. 2]
+  heap,             // kd-tree and heap. [Fig. 3]
+  locally_ordered,  // nearest-neighbour chain, one thread. [Fig. 4]
+  parallel,         // chains in regions of space, on the caller's arena
 };
 
-// Two clusters become one. Ids below N are leaves, id N+k is merge k; children come before their parent.
-// Canonical: merges are in post-order of the tree, and `left` holds the smaller least leaf. So equal trees are equal
+// Two clusters merged into one. Ids below N are leaves, id N+k is the cluster of merge k. Lists of merges are
+// canonical: in post-order of the tree, `left` being the child with the smaller least leaf. So equal trees give equal
 // lists.
 struct Merge {
   uint32_t left = 0, right = 0;
-  float cost = 0.0f;  // d(left, right), in the policy's units (see there: a policy may scale its input)
+  float cost = 0.0f;  // d(left, right), in units of the policy, which may scale its input
   constexpr bool operator==(const Merge&) const = default;
 };
 
-// All strategies build the same tree, ties included: of equally good pairs the one of the least leaves goes first, and
-// leaves that coincide are joined beforehand in balanced subtrees. N leaves give N-1 merges; 0 and 1 leaf give none. N
-// is below 2^31. Throws Error(cancelled).
+// All strategies build the same tree: among pairs of equal cost the one with the least leaves is merged first, and
+// leaves that coincide are merged beforehand into balanced subtrees. N leaves give N-1 merges; 0 and 1 leaf give none.
+// N is below 2^31. Throws Error(cancelled).
 
-// d = area of the joint box. [sec. 4] Boxes are finite and not empty, coordinates below 1e19.
-// Each side is taken 1e-7 of the whole longer than it is, so that boxes without an area still cluster by distance.
+// d = half the area of the joint box. [sec. 4] Boxes must be finite and not empty, with coordinates below 1e19. Each
+// side is extended by 1e-7 of the whole extent, so that boxes without area still cluster by distance.
 std::vector<Merge> agglomerate_boxes(std::span<const Aabb> boxes, Strategy strategy, Progress* progress = nullptr);
 
 // d = radius of the smallest ball around both. [Omohundro 1989] `centres`: n rows of `dimension` floats (1 to 16).
-// Nesting makes it the volume's order too. Throws Error(invalid_argument) on a value that is not finite or a radius
+// The least radius is also the least volume. Throws Error(invalid_argument) on values that are not finite and on radii
 // below 0.
 std::vector<Merge> agglomerate_balls(std::span<const float> centres, std::span<const float> radii, int dimension,
                                      Strategy strategy, Progress* progress = nullptr);

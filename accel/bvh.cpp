@@ -11,7 +11,6 @@
 namespace lumicut {
 namespace {
 
-// Which triangle of which mesh.
 struct Primitive {
   uint32_t mesh, prim;
 };
@@ -24,7 +23,7 @@ struct Built {
 Built build_meshes(const AccelGeometry& geometry, std::span<const uint32_t> meshes, const AccelOptions& options,
                    const BuildOptions& build, Progress* progress, bool number_through) {
   std::vector<Primitive> primitives;
-  std::vector<uint32_t> number;  // through all meshes
+  std::vector<uint32_t> number;  // of each primitive, counted through all meshes
   size_t count = 0;
   for (const uint32_t m : meshes) count += geometry.meshes[m].triangle_count;
   if (count > 0x1fffffffull)
@@ -33,7 +32,7 @@ Built build_meshes(const AccelGeometry& geometry, std::span<const uint32_t> mesh
   uint32_t through = 0;
   for (const uint32_t m : meshes)
     for (uint32_t i = 0; i < geometry.meshes[m].triangle_count; ++i, ++through) {
-      // Without a mask no ray sees it; so rays that see everything need no test.
+      // No ray sees a mesh whose mask is 0. Leaving it out spares rays with all mask bits the test.
       if (geometry.meshes[m].mask == 0 || !in_range(triangle_of(geometry.meshes[m], i))) continue;
       primitives.push_back({m, i});
       if (number_through) number.push_back(through);
@@ -68,7 +67,7 @@ Built build_meshes(const AccelGeometry& geometry, std::span<const uint32_t> mesh
   return built;
 }
 
-// Box of a mesh's points as an instance shows them; exact, where the box of the mesh's box would be loose.
+// Box of the transformed vertices of a mesh: tighter than the transformed box.
 Aabb world_box(const MeshView& mesh, const Transform& to_world) {
   Aabb box;
   for (size_t i = 0; i < mesh.triangle_count; ++i) {
@@ -77,7 +76,7 @@ Aabb world_box(const MeshView& mesh, const Transform& to_world) {
     for (const Vec3f& v : {t.v0, t.v1, t.v2}) box.extend(to_world.point(v));
   }
   if (box.empty()) return box;
-  // Rays are transformed with rounding of their own.
+  // Margin for rounding in the transformation of rays.
   const Vec3f reach = max(max(box.hi, -box.lo), Vec3f{}) * 1e-6f;
   return {box.lo - reach, box.hi + reach};
 }
@@ -136,7 +135,7 @@ std::unique_ptr<Bvh> Bvh::from_geometry(const AccelGeometry& geometry, const Acc
       out.bvh = &bvh->meshes_[instance.mesh];
       if (out.bvh->root == kEmptyChild) continue;
       const Aabb box = world_box(geometry.meshes[instance.mesh], instance.to_world);
-      // An instance may be moved out of range like a triangle.
+      // Instances out of range are left out, as triangles are.
       if (box.empty() || !(max_component(max(box.hi, -box.lo)) <= kHugeCoordinate)) continue;
       boxes.push_back(box);
       ids.push_back(i);
@@ -149,7 +148,7 @@ std::unique_ptr<Bvh> Bvh::from_geometry(const AccelGeometry& geometry, const Acc
     std::vector<float> areas(boxes.size());
     for (size_t i = 0; i < boxes.size(); ++i) areas[i] = boxes[i].half_area();
     bvh->top_ = collapse(tree, areas, 1, nullptr, progress);
-    // Leaves hold the instance itself.
+    // Leaf words hold the index of an instance.
     const auto renumber = [&](uint32_t& word) {
       if (word != kEmptyChild && (word & kLeafBit) != 0) word = kLeafBit | ids[word & ~kLeafBit];
     };

@@ -1,5 +1,5 @@
-// Our BVH: a binary tree over triangles or boxes by any of the builders, collapsed to eight-wide nodes, and its
-// traversal.
+// The BVH backend: a binary tree over triangles or boxes by any builder (bvh_build.h), collapsed to eight-wide nodes
+// and traversed in SIMD (bvh/).
 #pragma once
 
 #include <memory>
@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "accel/accel.h"
+#include "accel/bvh/traverse.h"
+#include "accel/bvh/wide_bvh.h"
 #include "accel/bvh_build.h"
-#include "accel/traverse.h"
-#include "accel/wide_bvh.h"
 
 namespace lumicut {
 
@@ -33,9 +33,9 @@ class Bvh final : public Accel {
     trace_points(scene_, light, directional, px, py, pz, n, out);
   }
 
-  // The binary tree: node 0 is the root, children lie side by side (TreeNode::first, first + 1), and a leaf's
+  // The binary tree: node 0 is the root, children are adjacent (TreeNode::first, first + 1), and a leaf's
   // primitives are primitives()[first, first + count). Empty without keep_tree, and for geometry with instances.
-  // Primitives of several meshes are numbered through: those of mesh 1 follow those of mesh 0. Triangles that reach
+  // Primitives are numbered consecutively: those of mesh 1 follow those of mesh 0. Triangles that reach
   // past kHugeCoordinate are in no leaf.
   const Tree& tree() const { return tree_; }
   std::span<const uint32_t> primitives() const { return tree_.prims; }

@@ -19,12 +19,12 @@ namespace lumicut {
 namespace {
 
 static_assert(sizeof(Ray) == sizeof(RTCRay) && offsetof(Ray, tfar) == offsetof(RTCRay, tfar));
-// Embree 4.3 has another number behind these fields (instPrimID), which is not read here.
+// Embree 4.3 has a further field (instPrimID) after these, which is not read here.
 static_assert(sizeof(Hit) <= sizeof(RTCHit) && offsetof(Hit, inst) == offsetof(RTCHit, instID));
 static_assert(offsetof(RayHit, hit) == offsetof(RTCRayHit, hit));
 
-// What Embree reports while it builds, from any of its threads. It may report that memory is out: nothing here
-// allocates.
+// State that Embree's callbacks write during a build, from any thread. They may report lack of memory, so they must not
+// allocate.
 struct DeviceState {
   std::mutex mutex;
   RTCError code = RTC_ERROR_NONE;
@@ -57,7 +57,7 @@ struct FilterUser {
   uint32_t mesh = 0;
 };
 
-// Embree asks for one ray or for a packet of them.
+// Called for one ray or for a packet.
 void on_filter(const RTCFilterFunctionNArguments* args) {
   const auto& user = *static_cast<const FilterUser*>(args->geometryUserPtr);
   for (unsigned i = 0; i < args->N; ++i) {
@@ -68,9 +68,9 @@ void on_filter(const RTCFilterFunctionNArguments* args) {
   }
 }
 
-// Each thread that builds has an allocator, which Embree binds to the scene's. Where memory runs out while it does that,
-// it stays bound to one that is then freed, and the thread's next build writes there. So once memory ran out, each build
-// has a thread of its own, alone.
+// Embree binds an allocator of each building thread to the scene's. When memory runs out during that, it stays bound to
+// a scene allocator that is then freed, and the thread's next build writes there. So after memory ran out once, each
+// build runs on a new thread.
 std::atomic<bool> threads_spoiled{false};
 
 class EmbreeAccel final : public Accel {
@@ -78,8 +78,8 @@ class EmbreeAccel final : public Accel {
   EmbreeAccel(const AccelGeometry& geometry, const AccelOptions& options, Progress* progress) {
     const auto start = std::chrono::steady_clock::now();
     state_.progress = progress;
-    // No threads of Embree's own: the build joins the caller's arena. No cache of tessellated surfaces, of which there
-    // are none: where there is no memory for it, Embree keeps a lock for ever that its next device waits for.
+    // No threads of Embree's own: the build runs on the caller's arena. No cache for tessellation, which is not used:
+    // if its allocation fails, Embree never releases a lock that the next device waits for.
     device_ = rtcNewDevice("start_threads=0,set_affinity=0,tessellation_cache_size=0");
     if (device_ == nullptr) {
       if (rtcGetDeviceError(nullptr) == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
@@ -111,7 +111,7 @@ class EmbreeAccel final : public Accel {
 
   void intersect(std::span<RayHit> rays) const override {
     embree::Context context(false);
-    RTCRayHit local{};  // Embree wants 16-byte alignment, which a host's array need not have
+    RTCRayHit local{};  // aligned to 16 bytes for Embree; the caller's array may not be
     for (RayHit& r : rays) {
       r.hit = {};
       if (!is_traceable(r.ray, limits_)) continue;
@@ -142,7 +142,7 @@ class EmbreeAccel final : public Accel {
     Packet<kWidth> packet;
     const bool sound = within(light, directional ? limits_.direction : limits_.origin);
     const float limit = directional ? limits_.origin : limits_.direction;
-    // What all rays share is written once: Embree changes tfar alone.
+    // Common fields are written once: Embree modifies tfar only.
     for (size_t i = 0; i < kWidth; ++i) {
       for (int axis = 0; axis < 3; ++axis) packet.org[axis][i] = packet.dir[axis][i] = light[axis];
       packet.tnear[i] = packet.time[i] = 0.0f;
@@ -262,7 +262,7 @@ class EmbreeAccel final : public Accel {
         check();
         rtcSetGeometryInstancedScene(geom, inner[instance.mesh]);
         rtcSetGeometryTransform(geom, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, instance.to_world.m);
-        rtcSetGeometryMask(geom, 0xffffffffu);  // the mesh inside has its own
+        rtcSetGeometryMask(geom, 0xffffffffu);  // masks are those of the instanced mesh
         rtcCommitGeometry(geom);
         rtcAttachGeometryByID(scene_, geom, i);
         rtcReleaseGeometry(geom);
@@ -301,9 +301,9 @@ class EmbreeAccel final : public Accel {
   DeviceState state_;
   RTCDevice device_ = nullptr;
   RTCScene scene_ = nullptr;
-  // With instances, Embree 3.13.5 as Debian builds it reads the octants of a coherent packet's rays from memory on the
-  // stack that it never wrote (AVX-512): it may never end. Without instances coherent packets are right, and 1.1 to 1.4
-  // times as fast.
+  // Only without instances, where coherent packets are 1.1 to 1.4 times as fast. With instances, Debian's build of
+  // Embree 3.13.5 reads the octants of a coherent packet's rays from uninitialised stack memory (AVX-512) and may not
+  // terminate.
   bool coherent_ = false;
   RayLimits limits_;
   std::vector<RTCScene> scenes_;

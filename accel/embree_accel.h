@@ -1,4 +1,4 @@
-// Embree (3 or 4) behind Accel. Only the factory is public; make_accel validates first.
+// Backend: Embree 3 or 4. Only the factory is public; make_accel validates first.
 #pragma once
 
 #include "accel/accel.h"

@@ -1,4 +1,4 @@
-// The only file that knows Embree 3 from Embree 4. LUMICUT_EMBREE_MAJOR comes from CMake.
+// Differences between Embree 3 and 4; no other file depends on the version. LUMICUT_EMBREE_MAJOR comes from CMake.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@ namespace lumicut::embree {
 
 inline constexpr bool kHasStreams = false;
 
-// Flags of a query; cheap to make, one per batch.
+// Flags of queries; cheap to construct, one per batch.
 class Context {
  public:
   explicit Context(bool coherent) {
@@ -32,7 +32,7 @@ class Context {
   void intersect(RTCScene scene, RTCRayHit* ray) { rtcIntersect1(scene, ray, &intersect_); }
   void occluded(RTCScene scene, RTCRay* ray) { rtcOccluded1(scene, ray, &occluded_); }
   void occluded16(const int* valid, RTCScene scene, RTCRay16* ray) { rtcOccluded16(valid, scene, ray, &occluded_); }
-  // Streams left Embree with version 4.
+  // Embree 4 has no streams.
   void occluded_stream(RTCScene, RTCRayN*, unsigned, size_t) {}
   void occluded_stream_aos(RTCScene, RTCRay*, unsigned) {}
 

@@ -22,7 +22,7 @@ class HostAccel final : public Accel {
 
   void intersect(std::span<RayHit> rays) const override {
     if (rays.empty()) return;
-    // Given back with the call, not kept by the thread: a callback may trace in its turn.
+    // Local, not per thread: callbacks may trace rays themselves.
     std::vector<float> limits(rays.size());
     for (size_t i = 0; i < rays.size(); ++i) {
       rays[i].hit = {};

@@ -86,12 +86,12 @@ Inverses invert_instances(const AccelGeometry& geometry) {
       stretch = std::max(stretch, std::abs(r.x) + std::abs(r.y) + std::abs(r.z));
       moved = std::max(moved, std::abs(dot(r, t)));
     }
-    // A hair less, for the rounding of single precision.
-    constexpr double kRoom = 0.999999 * kHugeCoordinate;
-    if (!(stretch * reach + moved < kRoom)) continue;
+    // Slightly less than the limit, for rounding to single precision.
+    constexpr double kLimit = 0.999999 * kHugeCoordinate;
+    if (!(stretch * reach + moved < kLimit)) continue;
     out.of.back() = inverse;
-    origin = std::min(origin, (kRoom - moved) / stretch);
-    direction = std::min(direction, kRoom / stretch);
+    origin = std::min(origin, (kLimit - moved) / stretch);
+    direction = std::min(direction, kLimit / stretch);
   }
   out.limits = {static_cast<float>(origin), static_cast<float>(direction)};
   return out;

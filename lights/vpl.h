@@ -19,7 +19,7 @@ struct Vpl {
   VplKind kind = VplKind::omni;
   Vec3f normal{};  // unit; directional: the way light travels; spot: axis; omni: 0
   uint32_t group = 0;
-  Rgb intensity{};  // W/sr along the normal; directional: irradiance W/m²
+  Rgb intensity{};                                // W/sr along the normal; directional: irradiance W/m²
   float edge_or_radius = 0.0f;                    // spot: cos_outer(); sphere: radius()
   float blend_cosine = 0.0f, spot_cosine = 0.0f;  // spot
   float spread_tan = 0.0f;  // spot: narrowed area lamps fall off with max(0, 1 − spread_tan·tanθ)

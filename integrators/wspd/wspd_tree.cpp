@@ -176,7 +176,8 @@ void WspdTree::find_balls(Progress& progress) {
       for (uint32_t i = node.first; i < node.last; ++i) {
         box.extend(place(i));
         power += static_cast<double>(luminance(lights_[i].intensity));
-        if (lights_[i].kind == VplKind::sphere) node.largest_sphere = std::max(node.largest_sphere, lights_[i].radius());
+        if (lights_[i].kind == VplKind::sphere)
+          node.largest_sphere = std::max(node.largest_sphere, lights_[i].radius());
       }
       node.center = node.last - node.first == 1 ? place(node.first) : box.center();
       float radius2 = 0.0f;

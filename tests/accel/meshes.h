@@ -25,6 +25,13 @@ struct Mesh {
   }
 };
 
+// The box of each triangle.
+inline std::vector<Aabb> boxes_of(const Mesh& mesh) {
+  std::vector<Aabb> boxes(mesh.indices.size() / 3);
+  for (size_t i = 0; i < mesh.indices.size(); ++i) boxes[i / 3].extend(mesh.positions[mesh.indices[i]]);
+  return boxes;
+}
+
 inline Vec3f random_point(Rng& rng) { return {rng.next_float(), rng.next_float(), rng.next_float()}; }
 inline Vec3f random_direction(Rng& rng) {
   for (;;) {
@@ -75,8 +82,8 @@ inline RayHit ray_of(const Vec3f& org, const Vec3f& dir, float tnear = 0.0f,
   return r;
 }
 
-// From a cube thrice as wide as the unit cube, in any direction. One draw after another: the order in which arguments are
-// evaluated is the compiler's.
+// From a cube thrice as wide as the unit cube, in any direction. One draw after another: the order in which arguments
+// are evaluated is the compiler's.
 inline RayHit random_ray(Rng& rng, float tfar = std::numeric_limits<float>::infinity()) {
   const Vec3f org = random_point(rng) * 3.0f - Vec3f{1, 1, 1};
   return ray_of(org, random_direction(rng), 0.0f, tfar);

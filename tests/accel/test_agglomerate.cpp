@@ -1,5 +1,4 @@
-// The agglomerative core: one tree from every strategy, the policies' promises, and input that would break a careless
-// one.
+// Agglomeration: the same tree from every strategy, properties of the policies, and degenerate input.
 #include "accel/agglomerate.h"
 
 #include <gtest/gtest.h>
@@ -20,13 +19,9 @@
 namespace lumicut {
 namespace {
 
-constexpr Strategy kFast[] = {Strategy::heap, Strategy::locally_ordered, Strategy::parallel};
+using test::boxes_of;
 
-std::vector<Aabb> boxes_of(const test::Mesh& mesh) {
-  std::vector<Aabb> boxes(mesh.indices.size() / 3);
-  for (size_t i = 0; i < mesh.indices.size(); ++i) boxes[i / 3].extend(mesh.positions[mesh.indices[i]]);
-  return boxes;
-}
+constexpr Strategy kFast[] = {Strategy::heap, Strategy::locally_ordered, Strategy::parallel};
 
 std::vector<LightLeaf> random_lights(size_t n, VplKind kind, uint64_t seed) {
   Rng rng(seed, Stage::test);
@@ -295,7 +290,7 @@ TEST(Agglomerate, CancelIsSeenByEveryStrategy) {
   }
 }
 
-// Distance between weighted centres: may fall when clusters merge, and says so.
+// Distance between weighted centres, which may decrease when clusters merge.
 struct CentroidPolicy {
   static constexpr bool kNonDecreasing = false;
   static constexpr int kFeatures = 3;
@@ -323,11 +318,26 @@ struct CentroidPolicy {
   }
 };
 
+namespace agglomeration = HWY_NAMESPACE::agglomeration;
+struct WithoutKey : CentroidPolicy {
+  size_t key_features() const = delete;
+};
+struct WithTooManyFeatures : CentroidPolicy {
+  static constexpr int kFeatures = agglomeration::kMaxFeatures + 1;
+};
+struct WithScalarCost : CentroidPolicy {
+  float cost(agglomeration::Lanes8, const Query<agglomeration::Lanes8>&, const float*) const { return 0.0f; }
+};
+static_assert(agglomeration::ClusterPolicy<CentroidPolicy>);
+static_assert(!agglomeration::ClusterPolicy<WithoutKey>);
+static_assert(!agglomeration::ClusterPolicy<WithTooManyFeatures>);
+static_assert(!agglomeration::ClusterPolicy<WithScalarCost>);
+
 TEST(Agglomerate, LocallyOrderedRefusesADissimilarityThatMayFall) {
   const CentroidPolicy policy;
   const float x[] = {0, 1, 2.1f, 10, 11.5f};
   const auto run = [&](Strategy s) {
-    HWY_NAMESPACE::agglomeration::Core<CentroidPolicy> core(policy, std::size(x), false, nullptr);
+    agglomeration::Core<CentroidPolicy> core(policy, std::size(x), false, nullptr);
     for (size_t i = 0; i < std::size(x); ++i) core.leaf(i)[0] = x[i], core.leaf(i)[1] = -x[i], core.leaf(i)[2] = 1;
     return core.run(s);
   };

@@ -60,7 +60,8 @@ void place(Rng& rng, Model model, float sharpness, bool inside, SurfacePoint& p,
   light.kind = VplKind::sphere;
   light.intensity = {1, 1, 1};
   light.radius() = 0.1f + 0.4f * rng.next_float();
-  const float distance = light.radius() * (inside ? rng.next_float() : 1.0f + 9.0f * rng.next_float() * rng.next_float());
+  const float distance =
+      light.radius() * (inside ? rng.next_float() : 1.0f + 9.0f * rng.next_float() * rng.next_float());
   Vec3f to = normalize(p.mirror + test::random_direction(rng) * (1.5f * light.radius() / distance));
   if (!(dot(to, p.normal) > 0)) to = p.normal;
   light.position = p.position + to * distance;

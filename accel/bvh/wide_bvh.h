@@ -1,5 +1,4 @@
-// Eight-wide nodes made from a binary tree, and the blocks of four primitives in their leaves. [layout after Embree's
-// BVH8]
+// Eight-wide BVH: nodes in structure of arrays, and leaves of blocks of four primitives. [layout after Embree's BVH8]
 #pragma once
 
 #include <cstdint>
@@ -18,7 +17,8 @@
 
 namespace lumicut {
 
-// A fixed array that asks for huge pages: traversal touches memory at random, and page walks cost as much as misses.
+// An array of fixed size in huge pages where possible: traversal accesses memory at random, and page walks cost as much
+// as cache misses.
 template <typename T>
 class HugeArray {
  public:
@@ -52,17 +52,18 @@ inline constexpr uint32_t kLeafBit = 0x80000000u;
 inline constexpr uint32_t kEmptyChild = 0xffffffffu;
 
 struct alignas(64) WideNode {
-  float planes[6][8];  // lo.x, hi.x, lo.y, hi.y, lo.z, hi.z of eight children; empty ones are inverted
-  uint32_t child[8];   // in the order in which an any-hit ray should visit them
+  float planes[6][8];  // lo.x, hi.x, lo.y, hi.y, lo.z, hi.z of eight children; empty slots are inverted boxes
+  uint32_t child[8];   // child words, in the order in which any-hit rays visit them
   uint32_t unused[8];
 };
 static_assert(sizeof(WideNode) == 256);
 
-// Four primitives side by side. Triangles: the corners, or for the fast test corner and two edges. Boxes: lo, hi.
+// Four primitives in structure of arrays. Triangles: three corners, or for the fast test a corner and two edges. Boxes:
+// lo, hi.
 struct alignas(64) LeafBlock {
   float v[3][3][4];           // [corner][axis][lane]
-  uint32_t prim[4], geom[4];  // prim is kNoId in lanes without a primitive
-  float extent[4];            // longest side of the triangle's box: what rounding of its edges is measured by
+  uint32_t prim[4], geom[4];  // prim is kNoId in unused lanes
+  float extent[4];            // longest side of each triangle's box; scales the error bounds of edge tests
 };
 static_assert(sizeof(LeafBlock) == 192);
 
@@ -73,17 +74,17 @@ struct WideBvh {
   size_t bytes() const { return nodes.size() * sizeof(WideNode) + leaves.size() * sizeof(LeafBlock); }
 };
 
-// The deepest stack a traversal needs: seven waiting children a level.
+// Size of traversal stacks: seven pending children per level.
 inline constexpr int kTraversalStack = 7 * kMaxTreeDepth + 8;
 
-// What goes into a block; lanes come preset as empty.
+// Fills one lane of a block, which is preset as unused.
 using FillBlock = std::function<void(LeafBlock& block, int lane, uint32_t prim)>;
 
-// Chooses by dynamic programming which nodes of the binary tree become wide ones and which subtrees of at most
-// `leaf_size` (1 to 4) primitives become one block, for the least expected cost. [after Ylitie et al. 2017, sec. 3.1]
-// The order of children is baked for any-hit rays: greatest chance of a hit per cost first, where a child is hit with
-// p = 1 - exp(-areas of its primitives / half the area of its box). `area`: of each primitive.
-// Without `fill`, leaves hold their primitive itself in place of a block (leaf_size 1).
+// Selects the nodes of the binary tree that become wide nodes, and the subtrees of at most `leaf_size` (1 to 4)
+// primitives that become blocks, for the least expected cost. Children are ordered for any-hit rays: greatest
+// probability of a hit per cost first, where a ray through a box hits with p = 1 - exp(-area of its primitives / half
+// the area of the box). `area`: of each primitive. Without `fill`, leaf words hold the index of a primitive instead of
+// a block (leaf_size 1).
 WideBvh collapse(const Tree& tree, std::span<const float> area, int leaf_size, const FillBlock& fill,
                  Progress* progress);
 

@@ -1,16 +1,16 @@
-// Rays through WideBvhs: single rays, and bundles of up to 64 that share an end. Picks AVX-512, AVX2, SSE4 or the
-// portable fallback at run time.
+// Traversal of wide BVHs: single rays, and bundles of up to 64 rays with one end in common. Selects AVX-512, AVX2, SSE4
+// or a portable fallback at run time.
 #pragma once
 
 #include <span>
 
 #include "accel/accel.h"
+#include "accel/bvh/wide_bvh.h"
 #include "accel/validate.h"
-#include "accel/wide_bvh.h"
 
 namespace lumicut {
 
-// What traversal reads. Each thing a scene does not use is compiled out of the loops that it runs.
+// Input of traversal. Features that a scene does not use are compiled out of its loops.
 struct TraceScene {
   struct Instance {
     Transform inverse;  // world to mesh
@@ -23,7 +23,7 @@ struct TraceScene {
   const uint32_t* mesh_masks = nullptr;  // by mesh
   bool robust = true;
   bool boxes = false;  // leaves hold boxes, not triangles
-  bool masks = false;  // some mesh has a mask that is not all ones
+  bool masks = false;  // some mesh mask is not all ones
   bool instanced = false;
   RayLimits limits;
 };

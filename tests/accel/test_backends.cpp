@@ -1,5 +1,5 @@
-// Every room behind Accel keeps the interface's promises. Parameterised over the rooms' names; "host" answers through
-// callbacks that search all triangles.
+// What every backend of Accel promises. Parameterised over the backends' names; "host" answers through callbacks that
+// search all triangles.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -79,7 +79,7 @@ struct LoopHost {
   }
 };
 
-class Rooms : public testing::TestWithParam<std::string> {
+class Backends : public testing::TestWithParam<std::string> {
  protected:
   std::unique_ptr<Accel> make(const AccelGeometry& geometry, bool robust = true) {
     if (GetParam() == "host") {
@@ -110,7 +110,7 @@ Mesh unit_triangle(float z) {
   return mesh;
 }
 
-TEST_P(Rooms, HitFieldsOfOneTriangleAreAsEmbreeDefinesThem) {
+TEST_P(Backends, HitFieldsOfOneTriangleAreAsEmbreeDefinesThem) {
   const Mesh mesh = unit_triangle(2);
   const auto accel = make({{mesh.view()}, {}, nullptr});
   const RayHit r = first(*accel, ray_of({0.25f, 0.5f, 0}, {0, 0, 0.5f}));
@@ -125,7 +125,7 @@ TEST_P(Rooms, HitFieldsOfOneTriangleAreAsEmbreeDefinesThem) {
   EXPECT_NEAR(r.hit.ng.z, 1, 1e-6);
 }
 
-TEST_P(Rooms, RangeOfTheRayIsKept) {
+TEST_P(Backends, RangeOfTheRayIsKept) {
   const Mesh mesh = unit_triangle(2);
   const auto accel = make({{mesh.view()}, {}, nullptr});
   const auto seen = [&](float tnear, float tfar) {
@@ -142,7 +142,7 @@ TEST_P(Rooms, RangeOfTheRayIsKept) {
   EXPECT_FALSE(seen(3, 1));
 }
 
-TEST_P(Rooms, RaysWithNaNOrInfinityHitNothing) {
+TEST_P(Backends, RaysWithNaNOrInfinityHitNothing) {
   const Mesh mesh = test::random_soup(50, 1.0f, 1);
   const auto accel = make({{mesh.view()}, {}, nullptr});
   for (int field = 0; field < 8; ++field)
@@ -167,7 +167,7 @@ TEST_P(Rooms, RaysWithNaNOrInfinityHitNothing) {
 }
 
 // Embree as Debian builds it ends the process on such rays, in an instance's space too.
-TEST_P(Rooms, RaysOutOfRangeHitNothing) {
+TEST_P(Backends, RaysOutOfRangeHitNothing) {
   if (GetParam() == "host") return;  // a host keeps its own rules
   const Mesh mesh = test::random_soup(50, 1.0f, 1), large = test::random_soup(20, 1e9f, 2);
   Transform small, flat;
@@ -203,7 +203,7 @@ TEST_P(Rooms, RaysOutOfRangeHitNothing) {
   }
 }
 
-TEST_P(Rooms, EmptyGeometryIsNeverHit) {
+TEST_P(Backends, EmptyGeometryIsNeverHit) {
   Mesh none;
   const AccelGeometry geometries[] = {{}, {{none.view()}, {}, nullptr}, {{none.view()}, {{0, {}}}, nullptr}};
   for (const AccelGeometry& g : geometries) {
@@ -217,7 +217,7 @@ TEST_P(Rooms, EmptyGeometryIsNeverHit) {
   }
 }
 
-TEST_P(Rooms, MaskHidesAMesh) {
+TEST_P(Backends, MaskHidesAMesh) {
   const Mesh front = unit_triangle(1), back = unit_triangle(2);
   AccelGeometry geometry{{front.view(), back.view()}, {}, nullptr};
   geometry.meshes[0].mask = 0b01;
@@ -236,7 +236,7 @@ struct HalfHole : HitFilter {
   bool passes(uint32_t, uint32_t, float u, float) const override { return u < 0.5f; }
 };
 
-TEST_P(Rooms, CutOutLetsTheRayThrough) {
+TEST_P(Backends, CutOutLetsTheRayThrough) {
   const Mesh front = unit_triangle(1), back = unit_triangle(2);
   const HalfHole filter;
   AccelGeometry geometry{{front.view(), back.view()}, {}, &filter};
@@ -254,7 +254,7 @@ TEST_P(Rooms, CutOutLetsTheRayThrough) {
   EXPECT_EQ(out[1], 1);
 }
 
-TEST_P(Rooms, InstancesMoveMirrorAndScale) {
+TEST_P(Backends, InstancesMoveMirrorAndScale) {
   const Mesh mesh = unit_triangle(0);
   Transform moved, mirrored, flat;
   moved.m[3] = 10;                                             // x
@@ -289,7 +289,7 @@ Transform random_transform(Rng& rng, float scale, bool mirrored) {
 }
 
 // Random soup, all features at once, against the loop over all triangles.
-TEST_P(Rooms, RandomRaysAgreeWithALoopOverAllTriangles) {
+TEST_P(Backends, RandomRaysAgreeWithALoopOverAllTriangles) {
   const Mesh a = test::random_soup(60, 0.2f, 3), b = test::random_soup(40, 0.3f, 4), c = test::sphere(6, 8);
   const HalfHole filter;
   Rng rng(5, Stage::test);
@@ -361,12 +361,12 @@ void expect_bundles_agree_with_single_rays(const Accel& accel, uint64_t seed) {
   }
 }
 
-TEST_P(Rooms, ManyPointsToOneLightAgreeWithSingleRays) {
+TEST_P(Backends, ManyPointsToOneLightAgreeWithSingleRays) {
   const Mesh a = test::random_soup(500, 0.08f, 7);
   expect_bundles_agree_with_single_rays(*make({{a.view()}, {}, nullptr}), 8);
 }
 
-TEST_P(Rooms, ManyPointsToOneLightAgreeWithSingleRaysOnInstances) {
+TEST_P(Backends, ManyPointsToOneLightAgreeWithSingleRaysOnInstances) {
   const Mesh a = test::random_soup(60, 0.2f, 7), b = test::random_soup(40, 0.1f, 9);
   for (uint64_t seed = 1; seed <= 14; ++seed) {
     Rng rng(seed, Stage::test);
@@ -377,7 +377,7 @@ TEST_P(Rooms, ManyPointsToOneLightAgreeWithSingleRaysOnInstances) {
   }
 }
 
-TEST_P(Rooms, ManyPointsToOneLightAgreeWithSingleRaysThroughCutOuts) {
+TEST_P(Backends, ManyPointsToOneLightAgreeWithSingleRaysThroughCutOuts) {
   const Mesh a = test::random_soup(200, 0.15f, 7);
   const HalfHole filter;
   AccelGeometry geometry{{a.view()}, {}, &filter};
@@ -385,7 +385,7 @@ TEST_P(Rooms, ManyPointsToOneLightAgreeWithSingleRaysThroughCutOuts) {
   for (const bool robust : {true, false}) expect_bundles_agree_with_single_rays(*make(geometry, robust), 11);
 }
 
-TEST_P(Rooms, BadGeometryIsNamed) {
+TEST_P(Backends, BadGeometryIsNamed) {
   const auto message = [&](const AccelGeometry& g) -> std::string {
     try {
       make(g);
@@ -412,7 +412,7 @@ TEST_P(Rooms, BadGeometryIsNamed) {
   EXPECT_EQ(message({{null}, {}, nullptr}), "mesh 0: has 1 triangles and no positions or indices");
 }
 
-TEST_P(Rooms, TrianglesWithHugeCoordinatesAreLeftOutAndTheRestIsSeen) {
+TEST_P(Backends, TrianglesWithHugeCoordinatesAreLeftOutAndTheRestIsSeen) {
   if (GetParam() == "host") return;  // a host keeps its own rules
   Mesh mesh = unit_triangle(1);
   mesh.add({-3e38f, -3e38f, 2}, {3e38f, -3e38f, 2}, {0, 3e38f, 2});
@@ -422,8 +422,8 @@ TEST_P(Rooms, TrianglesWithHugeCoordinatesAreLeftOutAndTheRestIsSeen) {
   EXPECT_EQ(first(*accel, ray_of({-5, 0.2f, 0}, {0, 0, 1})).hit.geom, kNoId);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, Rooms, testing::Values("embree", "bvh", "host"),
-                         [](const auto& room) { return room.param; });
+INSTANTIATE_TEST_SUITE_P(All, Backends, testing::Values("embree", "bvh", "host"),
+                         [](const auto& backend) { return backend.param; });
 
 TEST(MakeAccel, UnknownNameIsNamed) {
   try {
@@ -455,7 +455,7 @@ TEST(MakeAccel, CancelStopsTheBuild) {
   }
 }
 
-TEST(EmbreeRoom, BuildStaysInTheCallersArena) {
+TEST(EmbreeBackend, BuildStaysInTheCallersArena) {
   const Mesh mesh = test::random_soup(100000, 0.01f, 9);
   std::atomic<int> inside{0}, most{0};
   struct Watch : tbb::task_scheduler_observer {
@@ -483,7 +483,7 @@ TEST(EmbreeRoom, BuildStaysInTheCallersArena) {
   EXPECT_LT(used, 1.5 * took + 0.05);  // one thread's work; two would use twice the time
 }
 
-TEST(HostRoom, CallbackThatDoesNothingMeansNoHit) {
+TEST(HostBackend, CallbackThatDoesNothingMeansNoHit) {
   const Mesh mesh = unit_triangle(1);
   const auto accel = make_host_accel({[](void*, RayHit*, size_t) {}, [](void*, Ray*, size_t) {}, nullptr},
                                      {{mesh.view()}, {}, nullptr});
@@ -493,7 +493,7 @@ TEST(HostRoom, CallbackThatDoesNothingMeansNoHit) {
   EXPECT_FALSE(blocked(*accel, r));
 }
 
-TEST(HostRoom, WrongAnswersAreNamed) {
+TEST(HostBackend, WrongAnswersAreNamed) {
   const Mesh mesh = unit_triangle(1);
   struct Answer {
     Hit hit;
