@@ -37,5 +37,6 @@ inline void expect_good_tree(const Tree& tree, std::span<const Aabb> boxes) {
   }
   for (const int count : seen) ASSERT_EQ(count, 1);
   for (const int count : reached) ASSERT_EQ(count, 1);
+}
 
 }  // namespace lumicut::test
