@@ -332,12 +332,10 @@ Vec3f Scene::mapped_normal(const Material& material, const SurfaceHit& hit, cons
 }
 
 SurfaceInteraction Scene::interaction(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const {
-  SurfaceInteraction i;
-  static_cast<SurfaceHit&>(i) = hit;
-  i.to_viewer = to_viewer;
-  i.emitted = emitted(hit, to_viewer);
-  i.bsdf = bsdf({hit.position, hit.geometric_normal, hit.normal, to_viewer, epsilon_, pixel}, hit.material, hit.uv);
-  return i;
+  return {hit,
+          emitted(hit, to_viewer),
+          bsdf_parameters(hit.material, hit.uv),
+          {hit.position, hit.geometric_normal, hit.normal, to_viewer, epsilon_, pixel}};
 }
 
 BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv) const {

@@ -17,8 +17,11 @@ struct SurfaceHit {
 
 // A hit as it is seen from one side: made once, by Scene::interaction.
 struct SurfaceInteraction : SurfaceHit {
+  SurfaceInteraction(const SurfaceHit& hit, const Rgb& radiance, const BsdfParameters& parameters,
+                     const SurfaceView& view)
+      : SurfaceHit(hit), to_viewer(view.to_viewer), emitted(radiance), bsdf(parameters, view) {}
   Vec3f to_viewer;  // unit, away from the surface
-  Rgb emitted{};    // radiance towards the viewer
+  Rgb emitted;      // radiance towards the viewer
   Bsdf bsdf;
 };
 

@@ -59,7 +59,8 @@ SurfacePoint random_point(Rng& rng, int kind) {
   return p;
 }
 
-// Exponents and sharp lobes magnify a last bit: 1e-4 of the lobe's height is some thousand units in the last place.
+// Sharp lobes magnify rounding: GGX divides by α²·(n·v + n·l)² + side², where α² is 1e-4 at the least and side² comes from a
+// difference of squares with an error of 1e-7: up to 1e-3 of the value. An exponent of 1000 makes 1e-4 of a last bit.
 TEST(Lanes, EachLobeIsItsScalarForm) {
   Rng rng(21, Stage::test);
   for (int kind = 0; kind < 3; ++kind)
@@ -74,7 +75,8 @@ TEST(Lanes, EachLobeIsItsScalarForm) {
       float rgb[3];
       HWY_DYNAMIC_DISPATCH(ReflectanceOf)(points, 0, to_light, rgb);
       const Rgb expected = reflectance(p, to_light);
-      for (int k = 0; k < 3; ++k) ASSERT_NEAR(rgb[k], expected[k], 1e-4f * (1.0f + expected[k])) << kind << " " << i;
+      for (int k = 0; k < 3; ++k)
+        ASSERT_NEAR(rgb[k], expected[k], (kind == 2 ? 1e-3f : 1e-4f) * (1.0f + expected[k])) << kind << " " << i;
     }
 }
 
