@@ -24,7 +24,7 @@
 #include <cstddef>
 #include <type_traits>
 
-HWY_BEFORE_NAMESPACE();
+// No function of its own: no HWY_BEFORE_NAMESPACE, which clang refuses where nothing uses it.
 namespace lumicut::HWY_NAMESPACE::agglomeration {
 
 namespace hn = hwy::HWY_NAMESPACE;
@@ -61,6 +61,5 @@ concept ClusterPolicy = requires(const P& policy, const float* a, const float* b
 };
 
 }  // namespace lumicut::HWY_NAMESPACE::agglomeration
-HWY_AFTER_NAMESPACE();
 
 #endif  // LUMICUT_ACCEL_AGGLOMERATE_POLICY_INL_H_

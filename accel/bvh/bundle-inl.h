@@ -9,7 +9,7 @@
 
 #include "accel/bvh/lanes-inl.h"
 
-HWY_BEFORE_NAMESPACE();
+// No function here: no HWY_BEFORE_NAMESPACE, which clang refuses where nothing uses it.
 namespace lumicut::HWY_NAMESPACE {
 namespace {  // one includer, traverse.cpp: functions with one caller are inlined
 
@@ -29,6 +29,5 @@ struct Bundle {
 
 }  // namespace
 }  // namespace lumicut::HWY_NAMESPACE
-HWY_AFTER_NAMESPACE();
 
 #endif  // LUMICUT_ACCEL_BVH_BUNDLE_INL_H_
