@@ -21,6 +21,8 @@ float set_mirror(const Vec3f& to_viewer, SurfacePoint& p) {
   return cosine;
 }
 
+float largest_albedo(const SurfacePoint& layer) { return max_component(PointBsdf(layer).albedo()); }
+
 }  // namespace
 
 Bsdf::Bsdf(const BsdfParameters& parameters, const SurfaceView& view)
@@ -73,8 +75,7 @@ Rgb Bsdf::evaluate(const Vec3f& to_light) const {
 // Chance to choose the layer above.
 float Bsdf::coat_share() const {
   if (layer_count_ < 2) return 0.0f;
-  const float above = max_component(PointBsdf(layers_[1]).albedo()),
-              beneath = max_component(PointBsdf(layers_[0]).albedo());
+  const float above = largest_albedo(layers_[1]), beneath = largest_albedo(layers_[0]);
   return above / (above + beneath);
 }
 
@@ -164,19 +165,19 @@ std::optional<ScatterSample> Bsdf::scatter(Rng& rng) const {
   const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float(), lobe = rng.next_float();
   const auto specular = sample_specular(lobe, u, v);
   const float q_specular = specular ? std::min(1.0f, max_component(specular->weight)) : 0.0f;
-  float reflected = max_component(PointBsdf(layers_[0]).albedo());
-  if (layer_count_ > 1) reflected += max_component(PointBsdf(layers_[1]).albedo());
-  const float q_layers = std::min(1.0f, reflected);
+  const bool two = layer_count_ > 1;
+  const float beneath = largest_albedo(layers_[0]), above = two ? largest_albedo(layers_[1]) : 0.0f;
+  const float q_layers = std::min(1.0f, beneath + above);
   const float survive = std::min(1.0f, q_specular + q_layers);
   if (!(choice < survive)) return {};
   const float p_specular = survive * q_specular / (q_specular + q_layers);
   if (choice < p_specular)
     return ScatterSample{specular->direction, specular->weight, 1.0f / p_specular, specular->flags};
-  const float share = coat_share();
-  const bool above = layer_count_ > 1 && rng.next_float() < share;
-  const auto s = PointBsdf(layers_[above ? 1 : 0]).sample(lobe, u, v);
+  const float share = two ? above / (above + beneath) : 0.0f;
+  const bool coat = two && rng.next_float() < share;
+  const auto s = PointBsdf(layers_[coat ? 1 : 0]).sample(lobe, u, v);
   if (!s || dot(s->direction, side_) < 0.0f) return {};
-  return ScatterSample{s->direction, s->weight, 1.0f / ((survive - p_specular) * (above ? share : 1.0f - share)),
+  return ScatterSample{s->direction, s->weight, 1.0f / ((survive - p_specular) * (coat ? share : 1.0f - share)),
                        s->flags};
 }
 
