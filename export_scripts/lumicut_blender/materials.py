@@ -35,7 +35,7 @@ def ior_of(reflectance):
 
 
 def dimming(f0, alpha, f90=None):
-    """Mean share of light that the library's lobe leaves to what is beneath: twin of lobe_rest in scene/material.h."""
+    """Mean share of light that the library's lobe leaves to what is beneath: counterpart of lobe_transmittance in bsdf/lobe_transmittance.h."""
     a2 = alpha * alpha
     left = 1 - f0 * (1 - 1.643 * a2 / (1 + 2.248 * a2))
     fade = min(1, ((min(1, 50 * f0) if f90 is None else f90) / (1 + 8 * alpha + 5 * a2) + 0.4 * f0 * a2) / left)
@@ -43,7 +43,7 @@ def dimming(f0, alpha, f90=None):
 
 
 # Mean share of even light that single reflection at GGX facets loses, by α: twin of mean_facet_loss in
-# scene/facet_albedo.h; and about what balls of metal lose in Cycles 3.4, which masks view and light each by itself.
+# bsdf/facet_albedo.h; and about what balls of metal lose in Cycles 3.4, which masks view and light each by itself.
 ALPHAS = (0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1)
 LOSSES = (0, 0.006, 0.0318, 0.0842, 0.1532, 0.2269, 0.3, 0.3697, 0.4341, 0.4925, 0.5449, 0.5913)
 LOSSES_APART = (0, 0.006, 0.032, 0.087, 0.157, 0.233, 0.309, 0.385, 0.456, 0.524, 0.584, 0.638)

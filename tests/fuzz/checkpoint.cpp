@@ -6,7 +6,7 @@ using namespace lumicut;
 
 namespace {
 
-constexpr fuzz::Layout kLayout = {56, 16};  // plugin/passes.cpp
+constexpr fuzz::Layout kLayout = {56, 16};  // render/checkpoint.cpp
 
 lumicut_render_desc frame() {
   auto desc = box::frame(6, 4);
