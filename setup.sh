@@ -4,7 +4,7 @@ set -euo pipefail
 
 packages=(
   build-essential cmake ninja-build pkg-config git ccache               # tools
-  clang libclang-rt-dev                                                 # builds with sanitizers, fuzzing
+  clang libclang-rt-dev llvm                                            # builds with sanitizers and names in their reports
   clang-format clang-tidy flake8 shellcheck                             # tools/dev/lint.sh
   libembree-dev libtbb-dev libhwy-dev libboost-dev                      # the library: rays, threads, SIMD, Student's t
   libopenexr-dev libimath-dev libopenimageio-dev libtinyobjloader-dev   # the command's files

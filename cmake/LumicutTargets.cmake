@@ -54,7 +54,7 @@ endif()
 # numerical folders go without: their code does not depend on the form of the input, and counting takes minutes of
 # compile time a file.
 function(lumicut_count_edges target)
-  if(LUMICUT_FUZZ AND NOT target MATCHES "accel|clusters|integrators")
+  if(LUMICUT_FUZZ AND NOT target MATCHES "accel|bsdf|clustering|integrators|lights")
     target_compile_options(${target} PRIVATE -fsanitize=fuzzer-no-link)
   endif()
 endfunction()

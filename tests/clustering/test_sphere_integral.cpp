@@ -7,6 +7,7 @@
 #include "clustering/block_kernel.h"
 #include "clustering/light_kernel.h"
 #include "tests/clustering/random_lighting.h"
+#include "tests/support/trimmed.h"
 
 namespace lumicut {
 
@@ -83,7 +84,7 @@ TEST(SphereIntegral, IsThatOfBruteForceForEveryMaterialInsideAndOutside) {
         Case{Model::ggx, 0.3f, 0.10, 0.04}, Case{Model::ggx, 0.8f, 0.10, 0.04}}) {
     for (const bool inside : {false, true}) {
       double error2 = 0, difference = 0, sum = 0;
-      constexpr int kTrials = 40;
+      constexpr int kTrials = static_cast<int>(test::trimmed(40));
       for (int trial = 0; trial < kTrials; ++trial) {
         Rng rng(static_cast<uint64_t>(trial), Stage::test, 31 + static_cast<uint64_t>(c.model));
         SurfacePoint p;
@@ -101,8 +102,10 @@ TEST(SphereIntegral, IsThatOfBruteForceForEveryMaterialInsideAndOutside) {
                      std::to_string(rms) + " rms, " + std::to_string(bias) + " bias");
       std::printf("model %d %g %s: rms %.4f bias %+.4f\n", static_cast<int>(c.model), static_cast<double>(c.sharpness),
                   inside ? "inside" : "outside", rms, bias);
-      EXPECT_LT(rms, c.rms) << static_cast<int>(c.model) << " " << c.sharpness << " inside " << inside;
-      EXPECT_LT(std::abs(bias), c.bias) << static_cast<int>(c.model) << " " << c.sharpness << " inside " << inside;
+      EXPECT_LT(rms, test::trimmed_noise(c.rms))
+          << static_cast<int>(c.model) << " " << c.sharpness << " inside " << inside;
+      EXPECT_LT(std::abs(bias), test::trimmed_noise(c.bias))
+          << static_cast<int>(c.model) << " " << c.sharpness << " inside " << inside;
     }
   }
 }

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/rng.h"
 #include "geometry/predicates.h"
+#include "tests/support/trimmed.h"
 
 namespace lumicut {
 namespace {
@@ -121,12 +122,12 @@ TEST(DynamicHull, EqualsTheStaticHullAfterEveryOneOfAMillionOperations) {
         if (step > range || (longest > 40 && step > 5)) continue;
         Rng rng(++seed, Stage::test);
         Fuzz f;
-        crawl(f, rng, range, step, longest, 23000);
+        crawl(f, rng, range, step, longest, test::trimmed(23000));
         ASSERT_TRUE(f.good) << "range " << range << " step " << step << " longest " << longest << " at operation "
                             << f.operations;
         total += f.operations;
       }
-  EXPECT_GE(total, 1000000u);
+  EXPECT_GE(total, test::trimmed(1000000));
 }
 
 TEST(DynamicHull, FollowsSpiralsAndMonotoneWalksInDoubles) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/render.h"
+#include "tests/support/trimmed.h"
 
 namespace lumicut {
 namespace {
@@ -107,12 +108,13 @@ TEST(PathTracer, AnEmissiveMeshGivesWhatARectangleLampGives) {
     scene->set_camera(camera);
     Progress progress;
     scene->commit(progress);
-    return test::render(*scene, "path_tracer", {}, {{"samples", "4096"}}, 32, 16).radiance;
+    return test::render(*scene, "path_tracer", {}, {{"samples", std::to_string(test::trimmed(4096))}}, 32, 16).radiance;
   };
   const auto a = image(true), b = image(false);
   // Rows that see the floor alone, in four parts.
   const auto ra = region_means(a, 32, 16, 4), rb = region_means(b, 32, 16, 4);
-  for (size_t i = 8; i < 16; ++i) EXPECT_NEAR(ra[i] / rb[i], 1.0, 0.03) << i;  // about 1 % of noise each
+  for (size_t i = 8; i < 16; ++i)
+    EXPECT_NEAR(ra[i] / rb[i], 1.0, test::trimmed_noise(0.03)) << i;  // about 1 % of noise each
 }
 
 // A mirror on one wall, a rough metal block under a rough clear coat, a glass block: light by way of all of them.
@@ -145,8 +147,9 @@ std::unique_ptr<Scene> shiny_room() {
 
 TEST(Compensation, MirrorsMetalAndGlassShowWhatThePathTracerShows) {
   const auto scene = shiny_room();
-  const auto truth = test::render(*scene, "path_tracer", {}, {{"samples", "48"}}, 32, 24, 64).radiance;
-  constexpr int kPasses = 48;
+  const auto truth =
+      test::render(*scene, "path_tracer", {}, {{"samples", std::to_string(test::trimmed(48))}}, 32, 24, 64).radiance;
+  constexpr int kPasses = static_cast<int>(test::trimmed(48));
   const float clamp = 0.05f * scene->radius();
   std::vector<Rgb> mean(truth.size());
   for (int pass = 0; pass < kPasses; ++pass) {
@@ -155,19 +158,21 @@ TEST(Compensation, MirrorsMetalAndGlassShowWhatThePathTracerShows) {
             .radiance;
     for (size_t i = 0; i < mean.size(); ++i) mean[i] += image[i] / float{kPasses};
   }
-  EXPECT_NEAR(mean_of(mean) / mean_of(truth), 1.0, 0.015);
+  EXPECT_NEAR(mean_of(mean) / mean_of(truth), 1.0, test::trimmed_noise(0.015));
   const auto found = region_means(mean, 32, 24, 3), expected = region_means(truth, 32, 24, 3);
   for (size_t i = 0; i < found.size(); ++i)
-    EXPECT_NEAR(found[i], expected[i], 0.03 * mean_of(truth)) << "part " << i;  // caustics are noise in both: about 1 %
+    EXPECT_NEAR(found[i], expected[i], test::trimmed_noise(0.03) * mean_of(truth))
+        << "part " << i;  // caustics are noise in both: about 1 %
 }
 
 // What the clamp takes away comes back: in the mean over many sets of lights the image is the path tracer's.
 TEST(Compensation, VirtualLightsMeanThePathTracersImage) {
   const auto scene = test::make_room();
-  const auto truth =
-      test::render(*scene, "path_tracer", {}, {{"samples", "96"}, {"max_depth", "32"}}, 32, 24, 64).radiance;
+  const auto truth = test::render(*scene, "path_tracer", {},
+                                  {{"samples", std::to_string(test::trimmed(96))}, {"max_depth", "32"}}, 32, 24, 64)
+                         .radiance;
   constexpr float kClamp = 0.35f;  // of a room of side 2: a loss nobody can miss
-  constexpr int kPasses = 24;
+  constexpr int kPasses = static_cast<int>(test::trimmed(24));
   std::vector<Rgb> mean(truth.size()), clamped(truth.size());
   for (int pass = 0; pass < kPasses; ++pass) {
     const VplSet vpls = test::lights_of(*scene, 1500, 100 + pass);
@@ -177,19 +182,22 @@ TEST(Compensation, VirtualLightsMeanThePathTracersImage) {
     for (size_t i = 0; i < mean.size(); ++i) mean[i] += full[i] / float{kPasses}, clamped[i] += cut[i] / float{kPasses};
   }
   EXPECT_LT(mean_of(clamped) / mean_of(truth), 0.95);
-  EXPECT_NEAR(mean_of(mean) / mean_of(truth), 1.0, 0.01);
+  EXPECT_NEAR(mean_of(mean) / mean_of(truth), 1.0, test::trimmed_noise(0.01));
   const auto found = region_means(mean, 32, 24, 4), expected = region_means(truth, 32, 24, 4);
   for (size_t i = 0; i < found.size(); ++i)
-    EXPECT_NEAR(found[i], expected[i], 0.025 * mean_of(truth)) << "part " << i;  // noise of both: up to 0.8 %
+    EXPECT_NEAR(found[i], expected[i], test::trimmed_noise(0.025) * mean_of(truth))
+        << "part " << i;  // noise of both: up to 0.8 %
 }
 
 // Spheres clamp nothing, so compensation brings the gloss alone: what is reflected evenly must not come twice.
 TEST(Compensation, SpheresMeanThePathTracersImageAsTheyShrink) {
   const auto scene = test::make_room();
   const double truth =
-      mean_of(test::render(*scene, "path_tracer", {}, {{"samples", "64"}, {"max_depth", "32"}}, 32, 24, 64).radiance);
+      mean_of(test::render(*scene, "path_tracer", {},
+                           {{"samples", std::to_string(test::trimmed(64))}, {"max_depth", "32"}}, 32, 24, 64)
+                  .radiance);
   constexpr float kClamp = 0.35f;
-  constexpr int kPasses = 12;
+  constexpr int kPasses = static_cast<int>(test::trimmed(12));
   const auto mean = [&](float scale, float compensate) {
     double sum = 0;
     for (uint64_t pass = 0; pass < kPasses; ++pass)
@@ -207,8 +215,8 @@ TEST(Compensation, SpheresMeanThePathTracersImageAsTheyShrink) {
               small);
   // Twelve sets of a thousand lights know the mean to about 1 %. Spheres of 0.17 in a room of side 2 lose light in its
   // corners; were any counted twice, it would be 5 % too much (the test above).
-  EXPECT_NEAR(small, 1.0, 0.015);
-  EXPECT_NEAR(full, 0.97, 0.03);
+  EXPECT_NEAR(small, 1.0, test::trimmed_noise(0.015));
+  EXPECT_NEAR(full, 0.97, test::trimmed_noise(0.03));
   EXPECT_LT(alone, full);
   EXPECT_LT(points, alone);
 }

@@ -8,6 +8,7 @@
 
 #include "full_host.h"
 #include "lumicut/lumicut_state.h"
+#include "tests/support/trimmed.h"
 
 namespace {
 
@@ -509,7 +510,7 @@ TEST(Shade, ManyThreadsAtOnceGetWhatOneGets) {
     SCOPED_TRACE(id);
     api::Integrator i = integrator(device, 150, id.c_str());
     i.prepare(s);
-    const auto points = room_points(9000);
+    const auto points = room_points(lumicut::test::trimmed(9000));
     const auto expected = i.shade(points);
     EXPECT_GT(mean(expected), 0);
     std::vector<std::vector<float>> got(6);

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "box_scene.h"
+#include "tests/support/trimmed.h"
 
 namespace {
 
@@ -106,7 +107,7 @@ TEST(Render, OneThreadAndFourGiveTheSameBits) {
 
 // More work than any machine does while this program runs: without cancel the test would not end.
 api::Integrator endless(const api::Device& device, const char* id = "exhaustive") {
-  return integrator(device, 200000, id);
+  return integrator(device, static_cast<int>(lumicut::test::trimmed(200000)), id);
 }
 lumicut_render_desc endless_frame() {
   auto f = frame(1024, 1024);

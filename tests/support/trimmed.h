@@ -5,11 +5,14 @@
 
 namespace lumicut::test {
 
-// A tenth of n where the test is built with a sanitizer.
 #ifdef LUMICUT_SANITIZED
+// A tenth of n where the test is built with a sanitizer.
 constexpr size_t trimmed(size_t n) { return n / 10; }
+// A tolerance for the noise of n samples, for those of trimmed(n).
+constexpr double trimmed_noise(double tolerance) { return tolerance * 3.1622776601683795; }
 #else
 constexpr size_t trimmed(size_t n) { return n; }
+constexpr double trimmed_noise(double tolerance) { return tolerance; }
 #endif
 
 }  // namespace lumicut::test
