@@ -11,7 +11,7 @@ HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 
 template <VplKind kKind, Lobes kLobes>
-HWY_INLINE void Run(std::span<const Vpl> lights, float weight, float clamp2, const ShadePoints& points, size_t first,
+HWY_INLINE void Run(std::span<const Vpl> lights, float weight, Falloff falloff, const ShadePoints& points, size_t first,
                     size_t count, bool add, BlockSums& sums) {
   const D d;
   const V zero = hn::Zero(d), vweight = hn::Set(d, weight);
@@ -37,7 +37,7 @@ HWY_INLINE void Run(std::span<const Vpl> lights, float weight, float clamp2, con
         if constexpr (kLobes == Lobes::ggx) add_to(edge, intensity, parts.grazing);
         continue;
       }
-      const V geometry = Geometry<kKind>(d, light, clamp2, position, normal, to_light);
+      const V geometry = Geometry<kKind>(d, light, falloff, position, normal, to_light);
       if constexpr (kLobes == Lobes::ggx) {
         if (hn::AllFalse(d, hn::Gt(geometry, zero))) continue;
         const LobeSums parts = LobesTowards<kLobes>(d, points, p, normal, mirror, shape, to_light);
@@ -73,17 +73,17 @@ HWY_INLINE void Run(std::span<const Vpl> lights, float weight, float clamp2, con
 }
 
 template <VplKind kKind>
-HWY_INLINE void RunKind(std::span<const Vpl> lights, float weight, float clamp2, const ShadePoints& points,
+HWY_INLINE void RunKind(std::span<const Vpl> lights, float weight, Falloff falloff, const ShadePoints& points,
                         size_t first, size_t count, bool add, BlockSums& sums) {
   if (points.ggx())
-    Run<kKind, Lobes::ggx>(lights, weight, clamp2, points, first, count, add, sums);
+    Run<kKind, Lobes::ggx>(lights, weight, falloff, points, first, count, add, sums);
   else if (points.glossy())
-    Run<kKind, Lobes::cosine>(lights, weight, clamp2, points, first, count, add, sums);
+    Run<kKind, Lobes::cosine>(lights, weight, falloff, points, first, count, add, sums);
   else
-    Run<kKind, Lobes::none>(lights, weight, clamp2, points, first, count, add, sums);
+    Run<kKind, Lobes::none>(lights, weight, falloff, points, first, count, add, sums);
 }
 
-void LightBlock(std::span<const Vpl> lights, float weight, float clamp2, const ShadePoints& points, size_t first,
+void LightBlock(std::span<const Vpl> lights, float weight, Falloff falloff, const ShadePoints& points, size_t first,
                 size_t count, bool add, BlockSums& sums) {
   for (size_t begin = 0; begin < lights.size();) {
     size_t end = begin + 1;
@@ -91,19 +91,19 @@ void LightBlock(std::span<const Vpl> lights, float weight, float clamp2, const S
     const auto run = lights.subspan(begin, end - begin);
     switch (lights[begin].kind) {
       case VplKind::omni:
-        RunKind<VplKind::omni>(run, weight, clamp2, points, first, count, add, sums);
+        RunKind<VplKind::omni>(run, weight, falloff, points, first, count, add, sums);
         break;
       case VplKind::oriented:
-        RunKind<VplKind::oriented>(run, weight, clamp2, points, first, count, add, sums);
+        RunKind<VplKind::oriented>(run, weight, falloff, points, first, count, add, sums);
         break;
       case VplKind::directional:
-        RunKind<VplKind::directional>(run, weight, clamp2, points, first, count, add, sums);
+        RunKind<VplKind::directional>(run, weight, falloff, points, first, count, add, sums);
         break;
       case VplKind::spot:
-        RunKind<VplKind::spot>(run, weight, clamp2, points, first, count, add, sums);
+        RunKind<VplKind::spot>(run, weight, falloff, points, first, count, add, sums);
         break;
       case VplKind::sphere:
-        RunKind<VplKind::sphere>(run, weight, clamp2, points, first, count, add, sums);
+        RunKind<VplKind::sphere>(run, weight, falloff, points, first, count, add, sums);
         break;
     }
     add = true;
@@ -118,9 +118,9 @@ HWY_AFTER_NAMESPACE();
 namespace lumicut {
 HWY_EXPORT(LightBlock);
 
-void light_block(std::span<const Vpl> lights, float weight, float clamp2, const ShadePoints& points, size_t first,
+void light_block(std::span<const Vpl> lights, float weight, Falloff falloff, const ShadePoints& points, size_t first,
                  size_t count, bool add, BlockSums& sums) {
-  HWY_DYNAMIC_DISPATCH(LightBlock)(lights, weight, clamp2, points, first, count, add, sums);
+  HWY_DYNAMIC_DISPATCH(LightBlock)(lights, weight, falloff, points, first, count, add, sums);
 }
 
 }  // namespace lumicut

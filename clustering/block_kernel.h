@@ -14,8 +14,8 @@ struct alignas(64) BlockSums {
 
 // Unshadowed radiance that `lights` together give to points [first, first + count) of `points`, times `weight`: set, or
 // added to what is there. first a multiple of kLanes, count <= kMaxLit; sums of up to kLanes - 1 points past the end
-// are written too. `clamp2` as in light_points. Lights of one kind are best neighbours.
-void light_block(std::span<const Vpl> lights, float weight, float clamp2, const ShadePoints& points, size_t first,
+// are written too. `falloff` as in light_points. Lights of one kind are best neighbours.
+void light_block(std::span<const Vpl> lights, float weight, Falloff falloff, const ShadePoints& points, size_t first,
                  size_t count, bool add, BlockSums& sums);
 
 }  // namespace lumicut

@@ -8,19 +8,20 @@
 #endif
 
 #include "bsdf/reflectance-inl.h"
-#include "lights/vpl.h"
+#include "lights/falloff.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Falloff of a spot towards `to_light`, from each point. SIMD counterpart of spot_profile in lights/vpl.h.
-HWY_INLINE V SpotFalloff(D d, const Vpl& light, const V3& light_normal, const V3& to_light) {
+// Falloff of a spot towards `to_light`, from each point. SIMD counterpart of Falloff::of_spot.
+HWY_INLINE V SpotFalloff(D d, const Vpl& light, Falloff falloff, const V3& light_normal, const V3& to_light) {
   const V zero = hn::Zero(d);
   if (light.profile != 0) {  // lamps alone have one: lane by lane
+    const LightProfile* profile = falloff.profile(light);
     HWY_ALIGN float x[kLanes], y[kLanes], z[kLanes];
     hn::Store(to_light.x, d, x), hn::Store(to_light.y, d, y), hn::Store(to_light.z, d, z);
-    for (size_t i = 0; i < hn::Lanes(d); ++i) x[i] = profile_share(light, {-x[i], -y[i], -z[i]});
+    for (size_t i = 0; i < hn::Lanes(d); ++i) x[i] = profile_share(light, profile, {-x[i], -y[i], -z[i]});
     return hn::Load(d, x);
   }
   const V c = hn::Neg(Dot(light_normal, to_light)), one = hn::Set(d, 1.0f);
@@ -41,7 +42,7 @@ HWY_INLINE V SpotFalloff(D d, const Vpl& light, const V3& light_normal, const V3
 // Both cosines, the light's profile and the clamped squared distance, at points of `position` and `normal`; `to_light`:
 // unit. [thesis Eq. 1.1]
 template <VplKind kKind>
-HWY_INLINE V Geometry(D d, const Vpl& light, float clamp2, const V3& position, const V3& normal, V3& to_light) {
+HWY_INLINE V Geometry(D d, const Vpl& light, Falloff falloff, const V3& position, const V3& normal, V3& to_light) {
   const V zero = hn::Zero(d);
   const V3 light_normal = Set3(d, light.normal);
   V geometry = hn::Set(d, 1.0f);
@@ -54,11 +55,11 @@ HWY_INLINE V Geometry(D d, const Vpl& light, float clamp2, const V3& position, c
     const V dist2 = hn::Max(Dot(v, v), hn::Set(d, 1e-30f));
     const V inverse = hn::Div(hn::Set(d, 1.0f), hn::Sqrt(dist2));
     to_light = {hn::Mul(v.x, inverse), hn::Mul(v.y, inverse), hn::Mul(v.z, inverse)};
-    geometry = hn::Div(hn::Set(d, 1.0f), hn::Max(dist2, hn::Set(d, clamp2)));
+    geometry = hn::Div(hn::Set(d, 1.0f), hn::Max(dist2, hn::Set(d, falloff.clamp2)));
     if constexpr (kKind == VplKind::oriented) {
       geometry = hn::Mul(geometry, hn::Max(zero, hn::Neg(Dot(light_normal, to_light))));
     } else if constexpr (kKind == VplKind::spot) {
-      geometry = hn::Mul(geometry, SpotFalloff(d, light, light_normal, to_light));
+      geometry = hn::Mul(geometry, SpotFalloff(d, light, falloff, light_normal, to_light));
     }
   }
   return hn::Mul(geometry, hn::Max(zero, Dot(normal, to_light)));

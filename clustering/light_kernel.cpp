@@ -27,8 +27,8 @@ HWY_INLINE V MeanCosine(D d, const Vec3f& normal, const DirectionScatter& s, con
 }
 
 template <VplKind kKind, Lobes kLobes, bool kScatter = false>
-HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
-                        size_t count, LitPoints& lit, const uint16_t* wanted,
+HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, Falloff falloff, const ShadePoints& points,
+                        size_t first, size_t count, LitPoints& lit, const uint16_t* wanted,
                         const DirectionScatter* scatter = nullptr) {
   const D d;
   const size_t lanes = hn::Lanes(d);
@@ -54,7 +54,7 @@ HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, co
       reached = inside;
     } else {
       constexpr VplKind kShape = kScatter ? VplKind::omni : kKind;
-      geometry = Geometry<kShape>(d, light, clamp2, position, normal, to_light);
+      geometry = Geometry<kShape>(d, light, falloff, position, normal, to_light);
       if constexpr (kScatter) geometry = hn::Mul(geometry, MeanCosine(d, light.normal, *scatter, to_light));
       reached = hn::And(hn::Gt(geometry, zero), inside);
       if (hn::AllFalse(d, reached)) continue;
@@ -81,33 +81,33 @@ HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, float clamp2, co
 }
 
 template <VplKind kKind, bool kScatter = false>
-HWY_INLINE size_t LightKind(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points,
+HWY_INLINE size_t LightKind(const Vpl& light, const Rgb& intensity, Falloff falloff, const ShadePoints& points,
                             size_t first, size_t count, LitPoints& lit, const uint16_t* wanted,
                             const DirectionScatter* scatter = nullptr) {
   const auto with = [&]<Lobes kLobes>() {
-    return Light<kKind, kLobes, kScatter>(light, intensity, clamp2, points, first, count, lit, wanted, scatter);
+    return Light<kKind, kLobes, kScatter>(light, intensity, falloff, points, first, count, lit, wanted, scatter);
   };
   if (points.ggx()) return with.template operator()<Lobes::ggx>();
   return points.glossy() ? with.template operator()<Lobes::cosine>() : with.template operator()<Lobes::none>();
 }
 
-size_t LightPoints(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
+size_t LightPoints(const Vpl& light, const Rgb& intensity, Falloff falloff, const ShadePoints& points, size_t first,
                    size_t count, LitPoints& lit, const uint16_t* wanted, const DirectionScatter* scatter) {
   if (scatter != nullptr && light.kind == VplKind::sphere)
-    return LightKind<VplKind::sphere, true>(light, intensity, clamp2, points, first, count, lit, wanted, scatter);
+    return LightKind<VplKind::sphere, true>(light, intensity, falloff, points, first, count, lit, wanted, scatter);
   if (scatter != nullptr)
-    return LightKind<VplKind::oriented, true>(light, intensity, clamp2, points, first, count, lit, wanted, scatter);
+    return LightKind<VplKind::oriented, true>(light, intensity, falloff, points, first, count, lit, wanted, scatter);
   switch (light.kind) {
     case VplKind::omni:
-      return LightKind<VplKind::omni>(light, intensity, clamp2, points, first, count, lit, wanted);
+      return LightKind<VplKind::omni>(light, intensity, falloff, points, first, count, lit, wanted);
     case VplKind::oriented:
-      return LightKind<VplKind::oriented>(light, intensity, clamp2, points, first, count, lit, wanted);
+      return LightKind<VplKind::oriented>(light, intensity, falloff, points, first, count, lit, wanted);
     case VplKind::directional:
-      return LightKind<VplKind::directional>(light, intensity, clamp2, points, first, count, lit, wanted);
+      return LightKind<VplKind::directional>(light, intensity, falloff, points, first, count, lit, wanted);
     case VplKind::spot:
-      return LightKind<VplKind::spot>(light, intensity, clamp2, points, first, count, lit, wanted);
+      return LightKind<VplKind::spot>(light, intensity, falloff, points, first, count, lit, wanted);
     case VplKind::sphere:
-      return LightKind<VplKind::sphere>(light, intensity, clamp2, points, first, count, lit, wanted);
+      return LightKind<VplKind::sphere>(light, intensity, falloff, points, first, count, lit, wanted);
   }
   return 0;
 }
@@ -129,12 +129,12 @@ namespace lumicut {
 HWY_EXPORT(LightPoints);
 HWY_EXPORT(SphereAt);
 
-void light_points(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
+void light_points(const Vpl& light, const Rgb& intensity, Falloff falloff, const ShadePoints& points, size_t first,
                   size_t count, LitPoints& lit, const uint16_t* lanes, const DirectionScatter* scatter) {
-  lit.count = HWY_DYNAMIC_DISPATCH(LightPoints)(light, intensity, clamp2, points, first, count, lit, lanes, scatter);
+  lit.count = HWY_DYNAMIC_DISPATCH(LightPoints)(light, intensity, falloff, points, first, count, lit, lanes, scatter);
 }
 
-Rgb light_point(const Vpl& light, const Rgb& intensity, float clamp2, const SurfacePoint& point) {
+Rgb light_point(const Vpl& light, const Rgb& intensity, Falloff falloff, const SurfacePoint& point) {
   if (light.kind == VplKind::sphere) return HWY_DYNAMIC_DISPATCH(SphereAt)(light, point) * intensity;
   Vec3f to_light = -light.normal;
   float geometry = 1.0f;
@@ -142,10 +142,10 @@ Rgb light_point(const Vpl& light, const Rgb& intensity, float clamp2, const Surf
     const Vec3f v = light.position - point.position;
     const float dist2 = std::max(length2(v), 1e-30f);
     to_light = v / std::sqrt(dist2);
-    geometry = 1.0f / std::max(dist2, clamp2);
+    geometry = 1.0f / std::max(dist2, falloff.clamp2);
     const float cosine = -dot(light.normal, to_light);
     if (light.kind == VplKind::oriented) geometry *= std::max(0.0f, cosine);
-    if (light.kind == VplKind::spot) geometry *= spot_profile(light, -to_light);
+    if (light.kind == VplKind::spot) geometry *= falloff.of_spot(light, -to_light);
   }
   geometry *= std::max(0.0f, dot(point.normal, to_light));
   if (!(geometry > 0.0f)) return {};

@@ -8,6 +8,7 @@
 #include "accel/accel.h"
 #include "bsdf/shade_points.h"
 #include "core/stats.h"
+#include "lights/falloff.h"
 #include "lights/vpl.h"
 
 namespace lumicut {
@@ -42,11 +43,11 @@ inline float mean_cosine(const Vec3f& direction, const DirectionScatter& s, cons
 
 // Unshadowed radiance of `light`, with the summed intensity `intensity` in place of its own, at points
 // [first, first + count) of `points`; first a multiple of kLanes, count <= kMaxLit. Only points that get any are kept,
-// in order. `clamp2`: squared distance below which no light comes nearer; spheres need none. [thesis Eq. 1.1 without V]
+// in order. [thesis Eq. 1.1 without V]
 // `lanes`, where given, holds a bit for each point (kLanes points a word, as many words as points need): only points
 // whose bit is set are kept.
 // `scatter`, for oriented lights and spheres: `light` is the mean of a cluster, its normal their mean direction.
-void light_points(const Vpl& light, const Rgb& intensity, float clamp2, const ShadePoints& points, size_t first,
+void light_points(const Vpl& light, const Rgb& intensity, Falloff falloff, const ShadePoints& points, size_t first,
                   size_t count, LitPoints& lit, const uint16_t* lanes = nullptr,
                   const DirectionScatter* scatter = nullptr);
 
@@ -60,6 +61,6 @@ inline void trace_lit(const Accel& accel, const Vpl& light, LitPoints& lit) {
 
 // The same for one point, in plain arithmetic: what the kernel is tested against, and for code that is not hot.
 // Spheres: one lane of the kernel.
-Rgb light_point(const Vpl& light, const Rgb& intensity, float clamp2, const SurfacePoint& point);
+Rgb light_point(const Vpl& light, const Rgb& intensity, Falloff falloff, const SurfacePoint& point);
 
 }  // namespace lumicut

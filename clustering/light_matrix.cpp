@@ -36,14 +36,14 @@ struct Tile {
   uint32_t index[kTile];
   uint8_t occluded[kTile];
 
-  uint64_t fill(const Scene& scene, const Vpl* lights, size_t count, const ShadePoints& rows, float clamp2,
+  uint64_t fill(const Scene& scene, const Vpl* lights, size_t count, const ShadePoints& rows, Falloff falloff,
                 float shadowed_share, const Progress& progress) {
     uint64_t rays = 0;
     values.assign(rows.size() * kTile, 0.0f);
     for (size_t l = 0; l < count; ++l) {
       if (l % 16 == 0 && progress.cancelled()) return rays;
       for (size_t first = 0; first < rows.size(); first += kMaxLit) {
-        light_points(lights[l], lights[l].intensity, clamp2, rows, first, std::min(kMaxLit, rows.size() - first), lit);
+        light_points(lights[l], lights[l].intensity, falloff, rows, first, std::min(kMaxLit, rows.size() - first), lit);
         if (lights[l].kind == VplKind::directional) {
           trace_lit(scene.accel(), lights[l], lit);
           rays += lit.count;
@@ -103,7 +103,7 @@ std::vector<Vpl> order_lights(const std::vector<Vpl>& lights, const Progress* pr
 }
 
 LightMatrix LightMatrix::build(const Scene& scene, const std::vector<Vpl>& lights, const ShadePoints& rows,
-                               float clamp2, float shadowed_share, const Progress& progress) {
+                               Falloff falloff, float shadowed_share, const Progress& progress) {
   LightMatrix m;
   m.rows_ = rows.size();
   m.stride_ = round_up_to_lanes(rows.size());
@@ -116,7 +116,7 @@ LightMatrix LightMatrix::build(const Scene& scene, const std::vector<Vpl>& light
     if (progress.cancelled()) return;
     const auto tile = std::make_unique<Tile>();
     const size_t at = begin / kTile;
-    rays[at] = tile->fill(scene, lights.data() + begin, end - begin, rows, clamp2, shadowed_share, progress);
+    rays[at] = tile->fill(scene, lights.data() + begin, end - begin, rows, falloff, shadowed_share, progress);
     for (size_t l = begin; l < end; ++l) {
       uint16_t* column = m.values_.data() + l * m.stride_;
       for (size_t r = 0; r < m.rows_; ++r) {

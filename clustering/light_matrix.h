@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/progress.h"
+#include "lights/falloff.h"
 #include "lights/vpl.h"
 #include "scene/scene.h"
 
@@ -26,10 +27,10 @@ std::vector<Vpl> order_lights(const std::vector<Vpl>& lights, const Progress* pr
 
 class LightMatrix {
  public:
-  // Traces at most rows.size() · lights.size() shadow rays, on the caller's arena. `clamp2` as in light_points;
+  // Traces at most rows.size() · lights.size() shadow rays, on the caller's arena. `falloff` as in light_points;
   // what a light in shadow would give counts by `shadowed_share`. Takes 2 · stride() bytes a light. Throws
   // Error(cancelled).
-  static LightMatrix build(const Scene& scene, const std::vector<Vpl>& lights, const ShadePoints& rows, float clamp2,
+  static LightMatrix build(const Scene& scene, const std::vector<Vpl>& lights, const ShadePoints& rows, Falloff falloff,
                            float shadowed_share, const Progress& progress);
 
   size_t rows() const { return rows_; }

@@ -2,7 +2,7 @@
 
 namespace lumicut {
 
-uint64_t sum_lights(const Accel& accel, std::span<const ScaledLight> lights, float clamp2, const ShadePoints& points,
+uint64_t sum_lights(const Accel& accel, std::span<const ScaledLight> lights, Falloff falloff, const ShadePoints& points,
                     size_t first, size_t count, const Progress& progress, LitPoints& lit, Rgb* radiance,
                     uint32_t* rays) {
   std::fill(radiance, radiance + count, Rgb{});
@@ -11,7 +11,7 @@ uint64_t sum_lights(const Accel& accel, std::span<const ScaledLight> lights, flo
   for (size_t l = 0; l < lights.size(); ++l) {
     if (l % 64 == 0 && progress.cancelled()) break;
     const Vpl& light = *lights[l].light;
-    light_points(light, lights[l].intensity, clamp2, points, first, count, lit);
+    light_points(light, lights[l].intensity, falloff, points, first, count, lit);
     trace_lit(accel, light, lit);
     for (size_t i = 0; i < lit.count; ++i) {
       const uint32_t k = lit.index[i];

@@ -13,7 +13,7 @@ class Exhaustive final : public Integrator {
     scene_ = &scene;
     vpls_ = &vpls;
     const float clamp = clamp_distance(params, scene);
-    clamp2_ = clamp * clamp;
+    falloff_ = {clamp * clamp, vpls.profiles};
   }
 
   void shade(const ShadePoints& points, std::span<Rgb> radiance, std::span<PointCounts> counts,
@@ -27,7 +27,7 @@ class Exhaustive final : public Integrator {
       for (size_t l = 0; l < vpls_->lights.size(); ++l) {
         if (l % 256 == 0 && context.progress.cancelled()) return;
         const Vpl& light = vpls_->lights[l];
-        light_points(light, light.intensity, clamp2_, points, begin, n, *lit);
+        light_points(light, light.intensity, falloff_, points, begin, n, *lit);
         trace_lit(scene_->accel(), light, *lit);
         for (size_t i = 0; i < lit->count; ++i) {  // no branch: what is seen follows no pattern
           const uint32_t k = lit->index[i], seen = 1u - lit->occluded[i];
@@ -52,7 +52,7 @@ class Exhaustive final : public Integrator {
  private:
   const Scene* scene_ = nullptr;
   const VplSet* vpls_ = nullptr;
-  float clamp2_ = 0.0f;
+  Falloff falloff_ = 0.0f;
 };
 
 }  // namespace

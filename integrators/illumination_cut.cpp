@@ -72,7 +72,7 @@ class IlluminationCut final : public Integrator {
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
     const float clamp = clamp_distance(params, scene);
-    clamp2_ = clamp * clamp;
+    falloff_ = {clamp * clamp, vpls.profiles};
     error_ = static_cast<float>(params.real("error"));
     floor_ = static_cast<float>(params.real("dark_floor"));
     const std::string& visibility = params.choice("visibility");
@@ -137,7 +137,7 @@ class IlluminationCut final : public Integrator {
     const Vec3f to_light = v / std::sqrt(dist2);
     const bool faces = node.kind == VplKind::oriented || node.kind == VplKind::sphere;
     const float cosine = faces ? mean_cosine(mean.direction, mean.scatter, to_light) : 1.0f;
-    const float least2 = node.kind == VplKind::sphere ? mean.radius * mean.radius : clamp2_;
+    const float least2 = node.kind == VplKind::sphere ? mean.radius * mean.radius : falloff_.clamp2;
     return light * cosine * std::max(kHorizon, dot(normal, to_light)) / std::max(dist2, least2);
   }
 
@@ -297,8 +297,8 @@ class IlluminationCut final : public Integrator {
                                              float* irradiance, Counters& total) const {
     const LightNode& node = tree_.node(item.node);
     alignas(64) float bounds[kLanes], distances2[kLanes];
-    pair_bounds(node, nodes, clamp2_, bounds);
-    pair_distances2(node, nodes, clamp2_, distances2);
+    pair_bounds(node, nodes, falloff_.clamp2, bounds);
+    pair_distances2(node, nodes, falloff_.clamp2, distances2);
     const float size2 = node.kind == VplKind::directional ? 0.0f : length2(node.half);
     const bool narrow = node.leaf() || node.kind == VplKind::omni || node.cos_half > 0.94f;  // 20 degrees
     uint32_t accept = 0, split = 0, descend = 0;
@@ -316,7 +316,7 @@ class IlluminationCut final : public Integrator {
     if (accept != 0) {
       const Representative light = representative(item.node);
       const auto lanes = static_cast<uint16_t>(accept);
-      light_points(light.shining, node.intensity, clamp2_, reps, first, kLanes, lit, &lanes, light.scatter);
+      light_points(light.shining, node.intensity, falloff_, reps, first, kLanes, lit, &lanes, light.scatter);
       trace_lit(scene_->accel(), light.seen, lit);
       total.rays += lit.count;
       for (size_t i = 0; i < lit.count; ++i) {
@@ -361,7 +361,7 @@ class IlluminationCut final : public Integrator {
       if (progress.cancelled()) return;
       const LightNode& node = tree_.node(item.node);
       alignas(64) float bounds[kLanes];
-      pair_bounds(node, nodes, clamp2_, bounds);
+      pair_bounds(node, nodes, falloff_.clamp2, bounds);
       work.total.bounds += static_cast<uint64_t>(std::popcount(item.groups));
       const float size2 = node.kind == VplKind::directional ? 0.0f : length2(node.half);
       uint32_t split = 0;
@@ -410,7 +410,7 @@ class IlluminationCut final : public Integrator {
       const LightNode& node = tree_.node(item.node);
       const float size2 = node.kind == VplKind::directional ? 0.0f : length2(node.half);
       alignas(64) float bounds[kLanes];
-      pair_bounds(node, nodes, clamp2_, bounds);
+      pair_bounds(node, nodes, falloff_.clamp2, bounds);
       GroupLanes accepted{};
       bool any = false, rest = false;
       for (size_t j = 0; j < kLanes; ++j) {
@@ -429,7 +429,7 @@ class IlluminationCut final : public Integrator {
           rest = true;  // no point of the leaf would do better by much
         } else {
           alignas(64) float point_bounds[kLanes];
-          light_node_bounds(node, work.blocks[leaf], clamp2_, point_bounds);
+          light_node_bounds(node, work.blocks[leaf], falloff_.clamp2, point_bounds);
           const float* allowed = work.allowed + leaf * kLeaf;
           uint32_t ok = 0, reached = 0;
           for (size_t i = 0; i < kLanes; ++i) {
@@ -491,7 +491,7 @@ class IlluminationCut final : public Integrator {
                  const Rgb& intensity, const GroupLanes& lanes, Shadow shadow, uint32_t index, Workspace& work) const {
     const size_t base = group * kGroup, first = region * kRegion + base;
     LitPoints& lit = work.lit;
-    light_points(light.shining, intensity, clamp2_, points.points, first, std::min(kGroup, points.size() - first), lit,
+    light_points(light.shining, intensity, falloff_, points.points, first, std::min(kGroup, points.size() - first), lit,
                  lanes.data(), light.scatter);
     if (lit.count == 0) return;
     const Vpl* seen = &light.seen;
@@ -594,7 +594,8 @@ class IlluminationCut final : public Integrator {
     float radius = 0.0f;
   };
   std::vector<Mean> means_;  // a node; empty: the tree's own representatives serve
-  float clamp2_ = 0.0f, error_ = 0.02f, floor_ = 0.01f, separation2_ = 0.0225f;
+  Falloff falloff_ = 0.0f;
+  float error_ = 0.02f, floor_ = 0.01f, separation2_ = 0.0225f;
   Visibility visibility_ = Visibility::sampling;
   bool stochastic_ = false;
   uint64_t seed_ = 1;

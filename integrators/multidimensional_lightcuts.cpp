@@ -76,7 +76,7 @@ class MultidimensionalLightcuts final : public Integrator {
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
     const float clamp = clamp_distance(params, scene);
-    clamp2_ = clamp * clamp;
+    falloff_ = {clamp * clamp, vpls.profiles};
     error_ = static_cast<float>(params.real("error"));
     const auto limit = params.integer("max_cut");
     max_cut_ = limit == 0 ? std::numeric_limits<uint32_t>::max() : static_cast<uint32_t>(limit);
@@ -182,7 +182,7 @@ class MultidimensionalLightcuts final : public Integrator {
     const uint32_t index = work.allocate();
     Pairs& e = work.pairs[index];
     e.node = node_index, e.block = block_index;
-    pair_bounds(node, block.nodes, clamp2_, e.bound);
+    pair_bounds(node, block.nodes, falloff_.clamp2, e.bound);
     e.active = 0;
     for (uint32_t i = 0; i < kLanes; ++i) {
       if (!(active >> i & 1)) continue;
@@ -199,7 +199,7 @@ class MultidimensionalLightcuts final : public Integrator {
     const auto lanes = static_cast<uint16_t>(e.active);
     const size_t row = block.rows == 1 ? 0 : hash64(seed_, node_index) % block.rows;
     LitPoints& lit = work.lit;
-    light_points(light, node.intensity, clamp2_, work.reps, block.first_rep + row * kLanes, kLanes, lit, &lanes);
+    light_points(light, node.intensity, falloff_, work.reps, block.first_rep + row * kLanes, kLanes, lit, &lanes);
     trace_lit(scene_->accel(), light, lit);
     for (size_t k = 0; k < lit.count; ++k) {
       const uint32_t i = lit.index[k];
@@ -299,7 +299,8 @@ class MultidimensionalLightcuts final : public Integrator {
 
   const Scene* scene_ = nullptr;
   LightTree tree_;
-  float clamp2_ = 0.0f, error_ = 0.02f;
+  Falloff falloff_ = 0.0f;
+  float error_ = 0.02f;
   uint32_t max_cut_ = 0;
   uint64_t seed_ = 1;
 };

@@ -125,12 +125,14 @@ class PathTracer final : public Integrator {
     if (!delta_.empty()) {
       const size_t i = delta_.sample(path.rng.next_float());
       const Vpl& light = sampler_->delta_lights()[i];
-      add_shadow(path, light, light_point(light, light.intensity / static_cast<float>(delta_.pmf(i)), 0.0f, path.point),
+      add_shadow(path, light,
+                 light_point(light, light.intensity / static_cast<float>(delta_.pmf(i)), {0.0f, scene_->profiles()},
+                             path.point),
                  rays, shadows);
     }
     if (!sampler_->has_extended() && !sampler_->has_environment()) return;
     const DirectSample s = sampler_->sample_light(path.rng);
-    Rgb light = light_point(s.vpl, s.vpl.intensity, 0.0f, path.point);
+    Rgb light = light_point(s.vpl, s.vpl.intensity, {0.0f, scene_->profiles()}, path.point);
     if (!(max_component(light) > 0.0f)) return;
     if (s.seen_by_rays) {
       const bool far = s.vpl.kind == VplKind::directional;

@@ -21,7 +21,7 @@ class RowColumnSampling final : public Integrator {
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
     const float clamp = clamp_distance(params, scene);
-    clamp2_ = clamp * clamp;
+    falloff_ = {clamp * clamp, vpls.profiles};
     rows_ = static_cast<size_t>(params.integer("rows"));
     columns_ = static_cast<size_t>(params.integer("columns"));
     sampled_ = params.real("sampled");
@@ -45,8 +45,8 @@ class RowColumnSampling final : public Integrator {
       std::vector<uint32_t> rays(end - begin);
       Counters total;
       total.points = end - begin;
-      total.clusters = sum_lights(scene_->accel(), lights, clamp2_, points, begin, end - begin, context.progress, *work,
-                                  radiance.data() + begin, rays.data());
+      total.clusters = sum_lights(scene_->accel(), lights, falloff_, points, begin, end - begin, context.progress,
+                                  *work, radiance.data() + begin, rays.data());
       for (size_t i = begin; i < end; ++i) {
         total.rays += rays[i - begin];
         if (!counts.empty()) counts[i] = {static_cast<uint32_t>(lights.size()), rays[i - begin], 0};
@@ -66,7 +66,7 @@ class RowColumnSampling final : public Integrator {
     LightMatrix matrix;
     {
       const PhaseTimer timer(context.stats, "matrix rows");
-      matrix = LightMatrix::build(*scene_, lights_, choose_rows(points), clamp2_, kShadowedShare, context.progress);
+      matrix = LightMatrix::build(*scene_, lights_, choose_rows(points), falloff_, kShadowedShare, context.progress);
       Counters traced;
       traced.rays = matrix.rays();
       context.stats.add(traced);
@@ -103,7 +103,7 @@ class RowColumnSampling final : public Integrator {
   const Scene* scene_ = nullptr;
   std::vector<Vpl> lights_;
   std::vector<float> times_;
-  float clamp2_ = 0.0f;
+  Falloff falloff_ = 0.0f;
   double sampled_ = 0;
   size_t rows_ = 0, columns_ = 0;
   uint64_t seed_ = 1;

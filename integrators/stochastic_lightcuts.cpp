@@ -39,7 +39,7 @@ class StochasticLightcuts final : public Integrator {
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
     const float clamp = clamp_distance(params, scene);
-    clamp2_ = clamp * clamp;
+    falloff_ = {clamp * clamp, vpls.profiles};
     size_ = static_cast<size_t>(params.integer("lights"));
     seed_ = static_cast<uint64_t>(params.integer("seed"));
     const PhaseTimer timer(context.stats, "light tree");
@@ -102,7 +102,7 @@ class StochasticLightcuts final : public Integrator {
     work.heap.clear(), work.leaves.clear();
     const auto add = [&](uint32_t index) {
       alignas(64) float bound[kLanes];
-      light_node_bounds(tree_.node(index), work.block, clamp2_, bound);
+      light_node_bounds(tree_.node(index), work.block, falloff_.clamp2, bound);
       ++evaluated;
       float key = 0.0f;
       for (size_t i = 0; i < count; ++i) key += bound[i];
@@ -140,7 +140,7 @@ class StochasticLightcuts final : public Integrator {
       const Draw draw = draw_light(cut.node, point, rng);
       if (!(draw.probability > 0.0f)) continue;
       const Vpl& light = tree_.lights()[draw.light];
-      const Rgb given = light_point(light, light.intensity * (1.0f / draw.probability), clamp2_, point);
+      const Rgb given = light_point(light, light.intensity * (1.0f / draw.probability), falloff_, point);
       if (!(max_component(given) > 0.0f)) continue;
       // As all methods trace them: from the light.
       Ray ray;
@@ -171,7 +171,7 @@ class StochasticLightcuts final : public Integrator {
       const LightNode& node = tree_.node(index);
       if (node.kind == VplKind::directional) break;
       const Vec3f to_center = node.center - point.position;
-      const float least2 = node.kind == VplKind::sphere ? node.least_radius * node.least_radius : clamp2_;
+      const float least2 = node.kind == VplKind::sphere ? node.least_radius * node.least_radius : falloff_.clamp2;
       if (length2(node.half) < kSmall2 * std::max(length2(to_center), least2)) break;
       const Weights a = weights(tree_.node(node.first_child), point),
                     b = weights(tree_.node(node.first_child + 1), point);
@@ -227,7 +227,7 @@ class StochasticLightcuts final : public Integrator {
       if (!(emitted > 0.0f)) return {0.0f, 0.0f};
     }
     const Vec3f a{std::abs(v.x), std::abs(v.y), std::abs(v.z)};
-    const float least2 = node.kind == VplKind::sphere ? node.least_radius * node.least_radius : clamp2_;
+    const float least2 = node.kind == VplKind::sphere ? node.least_radius * node.least_radius : falloff_.clamp2;
     const float near2 = std::max(length2(max(a - node.half, Vec3f{})), least2),
                 far2 = std::max(length2(a + node.half), least2);
     const float w = luminance(node.intensity) * cosine * reflected * emitted;
@@ -240,7 +240,7 @@ class StochasticLightcuts final : public Integrator {
   LightTree tree_;
   std::vector<Range> ranges_;  // of the lights below each node
   std::vector<double> upto_;   // luminance of the lights before each
-  float clamp2_ = 0.0f;
+  Falloff falloff_ = 0.0f;
   size_t size_ = 0;
   uint64_t seed_ = 1;
 };

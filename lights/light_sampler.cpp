@@ -3,7 +3,7 @@
 #include <numbers>
 
 #include "core/parallel.h"
-#include "lights/light_profile.h"
+#include "lights/falloff.h"
 #include "lights/texture_integral.h"
 
 namespace lumicut {
@@ -139,7 +139,7 @@ void LightSampler::add_lamps(std::vector<double>& weights, const Progress* progr
       };
       switch (l.type) {
         case LightType::point:
-          if (const LightProfile* profile = l.profile != 0 ? find_profile(l.profile) : nullptr) {
+          if (const LightProfile* profile = l.profile != 0 ? scene_.profiles().find(l.profile) : nullptr) {
             // Measured from afar: its sphere blurs the edges of shadows alone.
             add(Kind::profile, i, value * profile->solid_angle(), false);
             stands(profiled(l, *profile));
@@ -433,7 +433,8 @@ Vpl LightSampler::sample_lamp(uint32_t lamp, Rng& rng) const {
   const Light& l = scene_.lights()[lamp];
   if (l.type == LightType::spot) return spot_of(l);
   if (l.type == LightType::point) {
-    if (const LightProfile* profile = l.profile != 0 ? find_profile(l.profile) : nullptr) return profiled(l, *profile);
+    if (const LightProfile* profile = l.profile != 0 ? scene_.profiles().find(l.profile) : nullptr)
+      return profiled(l, *profile);
     if (!(l.radius > 0.0f)) {
       Vpl v;
       v.position = l.position, v.intensity = l.value, v.group = l.group;
@@ -507,7 +508,7 @@ EmittedRay LightSampler::sample_ray(Rng& rng) const {
     }
     case Kind::profile: {
       const Light& l = scene_.lights()[e.index];
-      const LightProfile& profile = *find_profile(l.profile);
+      const LightProfile& profile = *scene_.profiles().find(l.profile);
       const double u = (static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32;
       const float v = rng.next_float();
       float vertical, horizontal, pdf;

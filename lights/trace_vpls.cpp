@@ -116,6 +116,7 @@ void trace_indirect(const Scene& scene, const LightSampler& emitters, const VplO
 VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progress) {
   progress.begin("light paths", options.count);
   VplSet set;
+  set.profiles = scene.profiles();
   const LightSampler emitters(scene, &progress);
   if (emitters.empty()) return set;
   set.lights = emitters.delta_lights();

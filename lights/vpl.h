@@ -6,6 +6,7 @@
 
 #include "core/fields.h"
 #include "core/vec.h"
+#include "scene/light_profile.h"
 
 namespace lumicut {
 
@@ -23,7 +24,7 @@ struct Vpl {
   float edge_or_radius = 0.0f;                    // spot: cos_outer(); sphere: radius()
   float blend_cosine = 0.0f, spot_cosine = 0.0f;  // spot
   float spread_tan = 0.0f;  // spot: narrowed area lamps fall off with max(0, 1 − spread_tan·tanθ)
-  // Spot: id of a LightProfile [lights/light_profile.h] in place of the falloff above; then blend_cosine, spot_cosine and
+  // Spot: id of a LightProfile [scene/light_profile.h] in place of the falloff above; then blend_cosine, spot_cosine and
   // spread_tan are the unit vector where its horizontal angle 0 lies, and intensity is that of its largest value.
   uint32_t profile = 0;
   LUMICUT_FIELDS(Vpl, position, kind, normal, group, intensity, edge_or_radius, blend_cosine, spot_cosine, spread_tan,
@@ -39,30 +40,11 @@ struct Vpl {
 };
 static_assert(sizeof(Vpl) == 64);
 
-// Share of a spot's intensity at cosine `c` to its axis. The SIMD counterpart is in clustering/light_kernel-inl.h.
-inline float spot_falloff(const Vpl& v, float c) {
-  float x = v.blend_cosine > 0.0f ? (c - v.cos_outer()) / v.blend_cosine : (c > v.cos_outer() ? 1.0f : 0.0f);
-  x = std::min(1.0f, std::max(0.0f, x));
-  x = x * x * (3.0f - 2.0f * x);
-  if (v.spot_cosine > 0.0f) x *= std::max(0.0f, c);
-  if (v.spread_tan > 0.0f && x > 0.0f) {
-    const float sine = std::sqrt(std::max(0.0f, 1.0f - c * c));
-    x *= std::max(0.0f, 1.0f - v.spread_tan * sine / std::max(c, 1e-6f));
-  }
-  return x;
-}
-
-// The same of a spot with a profile, towards a unit direction.
-float profile_share(const Vpl& v, const Vec3f& direction);
-
-inline float spot_profile(const Vpl& v, const Vec3f& direction) {
-  return v.profile != 0 ? profile_share(v, direction) : spot_falloff(v, dot(v.normal, direction));
-}
-
 struct VplSet {
   std::vector<Vpl> lights;
   uint64_t light_paths = 0;  // that were started; 0 for a host's own lights
-  LUMICUT_FIELDS(VplSet, lights, light_paths)
+  LightProfiles profiles;    // those that lights name
+  LUMICUT_FIELDS(VplSet, lights, light_paths, profiles)
 };
 
 }  // namespace lumicut

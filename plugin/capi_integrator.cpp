@@ -122,12 +122,10 @@ lumicut_result lumicut_integrator_set_lights(lumicut_integrator integrator, cons
     const AccessGuard::Hold hold = i.gate.change("lumicut_integrator_set_lights");
     if (count == 0) {
       i.host_lights.reset();
-      i.host_profiles.clear();
       i.host_lights_id = 0;
       return;
     }
     auto made = std::make_shared<const VplSet>(to_vpls(lights, count));
-    i.host_profiles = hold_profiles(made->lights);
     i.host_lights = std::move(made);
     i.host_lights_id = ++i.host_lights_sets;
   });

@@ -77,17 +77,22 @@ lumicut_result lumicut_scene_update_mesh(lumicut_scene scene, uint32_t id, const
 
 lumicut_result lumicut_scene_set_profiles(lumicut_scene scene, const lumicut_profile* profiles, uint64_t count) {
   return change_scene(scene, "lumicut_scene_set_profiles", [&](lumicut_scene_t& s) {
-    s.profiles = convert_all<ProfileRef>(read_array(profiles, count), to_profile);
+    auto made = convert_all<ProfileRef>(read_array(profiles, count), to_profile);
+    LightProfiles named;
+    for (const ProfileRef& profile : made) named.add(profile);  // throws where two share a name
+    s.profiles = std::move(made);
   });
 }
 
 lumicut_result lumicut_scene_set_lights(lumicut_scene scene, const lumicut_light* lights, uint64_t count) {
   return change_scene(scene, "lumicut_scene_set_lights", [&](lumicut_scene_t& s) {
+    LightProfiles used;
     auto made = convert_all<Light>(read_array(lights, count), [&](const lumicut_light& light, uint64_t i) {
-      return to_light(light, i, s.profiles);
+      Light of = to_light(light, i, s.profiles);
+      if (light.profile != 0) used.add(s.profiles[light.profile - 1]);
+      return of;
     });
-    s.light_profiles = hold_profiles(made);
-    s.scene.set_lights(std::move(made));
+    s.scene.set_lights(std::move(made), std::move(used));
     s.changed = true;
   });
 }

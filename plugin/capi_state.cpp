@@ -2,7 +2,6 @@
 #include <cstring>
 #include <limits>
 
-#include "lights/light_profile.h"
 #include "lights/trace_vpls.h"
 #include "plugin/check.h"
 #include "plugin/convert.h"
@@ -113,7 +112,7 @@ void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uin
   at += h.lights * sizeof(Vpl);
   std::shared_ptr<VplSet> vpls;
   try {
-    vpls = std::make_shared<VplSet>(to_vpls(saved.data(), h.lights));
+    vpls = std::make_shared<VplSet>(to_vpls(saved.data(), h.lights, s.scene.profiles()));
   } catch (const Error& error) {
     fail_bytes(std::string("a light in it makes no sense: ") + error.what());
   }
@@ -127,17 +126,13 @@ void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uin
   next->vpls_key = tracing_key(i.params);
   next->host_lights = h.host_lights != 0 ? i.host_lights_sets + 1 : 0;
   next->params = i.params;
-  next->profiles = hold_profiles(vpls->lights);
   next->standing_off = off_surfaces(*vpls, s.scene);
+  next->standing_off.profiles.prefer(s.scene.profiles());
   next->method = i.entry.create();
   next->method->load_state(s.scene, next->standing_off, *next->params, {at, h.method_bytes}, {progress, stats});
   stats.set_value("vpls", static_cast<double>(vpls->lights.size()));
   stats.set_value("light_paths", static_cast<double>(h.light_paths));
   // From here nothing fails.
-  if (h.host_lights != 0)
-    i.host_profiles = next->profiles;
-  else
-    i.host_profiles.clear();
   i.host_lights = h.host_lights != 0 ? std::shared_ptr<const VplSet>(vpls) : nullptr;
   i.host_lights_id = next->host_lights;
   if (h.host_lights != 0) ++i.host_lights_sets;

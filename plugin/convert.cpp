@@ -6,9 +6,9 @@
 
 #include "accel/bvh_build.h"
 #include "core/parallel.h"
-#include "lights/light_profile.h"
 #include "plugin/check.h"
 #include "plugin/descriptors.h"
+#include "plugin/profile_names.h"
 
 namespace lumicut {
 
@@ -203,9 +203,9 @@ ProfileRef to_profile(const lumicut_profile& in, uint64_t index) {
     return std::vector<float>(values, values + count);
   };
   try {
-    return keep_profile({copied("vertical", in.vertical, in.vertical_count),
-                         copied("horizontal", in.horizontal, in.horizontal_count),
-                         copied("values", in.values, size_t{in.vertical_count} * in.horizontal_count)});
+    return shared_profile({copied("vertical", in.vertical, in.vertical_count),
+                           copied("horizontal", in.horizontal, in.horizontal_count),
+                           copied("values", in.values, size_t{in.vertical_count} * in.horizontal_count)});
   } catch (const Error& error) {
     const std::string text = error.what();
     if (text.rfind("lumicut_profile", 0) == 0) throw;
@@ -364,7 +364,7 @@ Camera to_camera(const lumicut_camera& in) {
   return camera;
 }
 
-VplSet to_vpls(const lumicut_vpl* lights, uint64_t count) {
+VplSet to_vpls(const lumicut_vpl* lights, uint64_t count, const LightProfiles& known) {
   static_assert(sizeof(lumicut_vpl) == sizeof(Vpl));
   VplSet set;
   if (count == 0) return set;
@@ -378,8 +378,12 @@ VplSet to_vpls(const lumicut_vpl* lights, uint64_t count) {
     c.integer("group", in.group, 0, kMaxGroup);
     c.not_negative("intensity", in.intensity);
     if (in.profile != 0 && in.kind != LUMICUT_VPL_SPOT) c.fail("profile", "only spots have one");
-    if (in.profile != 0 && find_profile(in.profile) == nullptr)
-      c.fail("profile", number_text(uint64_t{in.profile}) + " is no profile that a scene was given");
+    if (in.profile != 0 && set.profiles.find(in.profile) == nullptr) {
+      const ProfileRef named = known.find(in.profile) != nullptr ? known.hold(in.profile) : named_profile(in.profile);
+      if (named == nullptr)
+        c.fail("profile", number_text(uint64_t{in.profile}) + " is no profile that a scene was given");
+      set.profiles.add(named);
+    }
     Vpl& vpl = set.lights[i];
     vpl.kind = static_cast<VplKind>(in.kind);
     vpl.group = in.group;

@@ -5,7 +5,6 @@
 #include <memory>
 
 #include "film/film.h"
-#include "lights/light_profile.h"
 #include "lights/vpl.h"
 #include "plugin/boundary.h"
 #include "render/frame.h"
@@ -30,8 +29,9 @@ std::vector<Vec3f> to_positions(const float* xyz, uint64_t count, const char* ow
 std::vector<Vec3f> to_normals(const float* xyz, uint64_t count);  // unchecked: the scene mends broken ones
 std::vector<Transform> to_transforms(const float* m, uint64_t count, const char* owner);
 
-// A host's lights. Normals within 1 % of unit length are made unit.
-VplSet to_vpls(const lumicut_vpl* lights, uint64_t count);
+// A host's lights. Normals within 1 % of unit length are made unit. Profiles that they name are looked for in `known`
+// first, then among all of the process.
+VplSet to_vpls(const lumicut_vpl* lights, uint64_t count, const LightProfiles& known = {});
 
 // Points [first, last) of a host, checked against the scene's materials and appended to `out`, where a clear coat's
 // lobe follows its point. Where the scene has any: the place of each point in `out`; else empty.

@@ -95,9 +95,8 @@ struct lumicut_scene_t : lumicut::ObjectOf<lumicut_scene_t> {
   lumicut::AccessGuard gate{lumicut::HandleKind::scene};
   lumicut::Work work;
   lumicut::Scene scene;
-  std::vector<lumicut::ProfileRef> profiles;        // for lights that are set after
-  std::vector<lumicut::ProfileRef> light_profiles;  // of the lights as they are
-  bool changed = true;                              // beside the camera; which needs no new build and no new lights
+  std::vector<lumicut::ProfileRef> profiles;  // for lights that are set after
+  bool changed = true;                        // beside the camera; which needs no new build and no new lights
   bool camera_changed = false;
   std::unique_ptr<lumicut::Stats> stats = std::make_unique<lumicut::Stats>();
   std::string stats_text;

@@ -34,7 +34,7 @@ void ClampCompensation::near_mesh(const SurfacePoint& point, Rng& rng, std::vect
   const Vec3f v = s.vpl.position - point.position;
   const float d2 = length2(v), c2 = distance_ * distance_;
   if (!(d2 < c2)) return;
-  const Rgb lost = light_point(s.vpl, s.vpl.intensity, 0.0f, point) * (1.0f - d2 / c2);
+  const Rgb lost = light_point(s.vpl, s.vpl.intensity, {0.0f, scene_.profiles()}, point) * (1.0f - d2 / c2);
   if (!(max_component(lost) > 0.0f) || !is_finite(lost)) return;
   const Vec3f to_light = normalize(v);
   const double cosine = std::max(1e-9f, -dot(s.vpl.normal, to_light));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -42,6 +43,13 @@ template <typename T>
 uint64_t hash_value(uint64_t seed, const std::optional<T>& value) {
   seed = hash_value(seed, value.has_value());
   return value ? hash_value(seed, *value) : seed;
+}
+
+// What is shared is hashed by its content.
+template <typename T>
+uint64_t hash_value(uint64_t seed, const std::shared_ptr<T>& value) {
+  seed = hash_value(seed, value != nullptr);
+  return value != nullptr ? hash_value(seed, *value) : seed;
 }
 
 inline uint64_t hash_value(uint64_t seed, const std::string& text) {

@@ -3,23 +3,8 @@
 #include <charconv>
 
 #include "hwy/highway.h"
-#include "lights/light_profile.h"
 
 namespace lumicut {
-
-namespace {
-
-// What lights name by number, by content.
-template <typename Lights>
-uint64_t hash_profiles(const Lights& lights) {
-  uint64_t h = 0;
-  for (const auto& light : lights)
-    if (const LightProfile* profile = light.profile != 0 ? find_profile(light.profile) : nullptr)
-      h = hash_value(h, *profile);
-  return h;
-}
-
-}  // namespace
 
 void Identity::add_text(std::string_view name, const std::string& value) {
   text_.append(name).append("=").append(value).append("\n");
@@ -39,11 +24,10 @@ void Identity::add(const Scene& scene, bool camera) {
   scene.for_each_part([&](std::string_view name, const auto& part) {
     if (camera || name != "camera") add_hash(name, hash_value(0, part));
   });
-  add_hash("light profiles", hash_profiles(scene.lights()));
 }
 
 void Identity::add_virtual_lights(const VplSet* lights) {
-  add_hash("virtual lights", lights == nullptr ? 0 : hash_value(hash_profiles(lights->lights), *lights));
+  add_hash("virtual lights", lights == nullptr ? 0 : hash_value(0, *lights));
 }
 
 std::string Difference::text() const {

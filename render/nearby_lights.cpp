@@ -64,7 +64,7 @@ uint64_t NearbyLights::key(const Cell& c) {
 Rgb NearbyLights::lost_light(uint32_t lamp, const Vpl& vpl, const SurfacePoint& point) const {
   const float d2 = length2(vpl.position - point.position), c2 = distance_ * distance_;
   if (!(d2 < c2)) return {};
-  Rgb lost = light_point(vpl, vpl.intensity, 0.0f, point) * (1.0f - d2 / c2);
+  Rgb lost = light_point(vpl, vpl.intensity, {0.0f, scene_.profiles()}, point) * (1.0f - d2 / c2);
   const Light& light = scene_.lights()[lamp];
   if (LightSurfaces::has(light) && max_component(lost) > 0.0f) {
     const Vec3f to_light = normalize(vpl.position - point.position);

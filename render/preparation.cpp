@@ -75,9 +75,9 @@ void Preparation::prepare(const Scene& scene, std::shared_ptr<const void> scene_
   progress.check();
   into.set_value("vpls", static_cast<double>(next->vpls->lights.size()));
   into.set_value("light_paths", static_cast<double>(next->vpls->light_paths));
-  next->profiles = hold_profiles(next->vpls->lights);
   next->method = entry.create();
   next->standing_off = off_surfaces(*next->vpls, scene);
+  next->standing_off.profiles.prefer(scene.profiles());
   next->method->prepare(scene, next->standing_off, *next->params, {progress, into});
   progress.check();
   prepared = std::move(next);

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "integrators/integrator.h"
-#include "lights/light_profile.h"
 
 namespace lumicut {
 
@@ -24,7 +23,6 @@ struct Prepared {
   std::string params_key, vpls_key;    // the parameters it was made with: all, those of light tracing
   uint64_t host_lights = 0;            // which of the host's sets; 0: traced
   std::shared_ptr<const VplSet> vpls;  // as traced, or as the host gave them
-  std::vector<ProfileRef> profiles;    // theirs
   VplSet standing_off;                 // the same, off their surfaces: what the method shades with
   std::optional<Params> params;
   std::unique_ptr<Integrator> method;
@@ -41,7 +39,6 @@ struct Preparation {
   const IntegratorEntry& entry;
   Params params;
   std::shared_ptr<const VplSet> host_lights;  // null: traced
-  std::vector<ProfileRef> host_profiles;      // theirs
   uint64_t host_lights_id = 0;                // rises with each set; 0 where there are none
   uint64_t host_lights_sets = 0;
   std::unique_ptr<Prepared> prepared;

@@ -37,6 +37,7 @@ std::vector<GroupMethod> RenderLoop::methods(const Prepared& prepared, std::vect
   if (groups.empty()) return {{0, prepared.method.get()}};
   of_groups.clear();
   of_groups.resize(groups.size());
+  for (OfGroup& of : of_groups) of.lights.profiles = prepared.standing_off.profiles;
   for (const Vpl& v : prepared.standing_off.lights) {
     const auto at = std::lower_bound(groups.begin(), groups.end(), v.group);
     if (at != groups.end() && *at == v.group)

@@ -24,7 +24,7 @@ struct Light {
   bool spot_cosine = false;
   Vec3f u{}, v{};              // rectangle: whole edges; disk: whole axes; emits towards u×v
   float spread = 3.14159265f;  // rectangle, disk: opening angle; π: Lambertian
-  uint32_t profile = 0;  // point: id of a LightProfile [lights/light_profile.h] about `direction`, `value` its largest
+  uint32_t profile = 0;  // point: id of a LightProfile [scene/light_profile.h] about `direction`, `value` its largest
   Vec3f tangent{};       // profile: unit, where its horizontal angle 0 lies; orthogonal to `direction`
   LUMICUT_FIELDS(Light, type, group, value, position, radius, direction, cos_outer, blend_cosine, spot_cosine, u, v,
                  spread, profile, tangent)

@@ -114,8 +114,9 @@ void Scene::update_mesh(uint32_t id, std::vector<Vec3f> positions, std::vector<V
   committed_ = false;
 }
 
-void Scene::set_lights(std::vector<Light> lights) {
+void Scene::set_lights(std::vector<Light> lights, LightProfiles profiles) {
   lights_ = std::move(lights);
+  profiles_ = std::move(profiles);
   committed_ = false;
 }
 void Scene::set_environment(const Environment& environment) {
@@ -148,6 +149,10 @@ void Scene::check_references() const {
     check_texture(materials_[i].roughness_texture, i, "roughness_texture");
     check_texture(materials_[i].metallic_texture, i, "metallic_texture");
   }
+  for (size_t i = 0; i < lights_.size(); ++i)
+    if (lights_[i].profile != 0 && profiles_.find(lights_[i].profile) == nullptr)
+      fail_argument(at("light", i) + ".profile = " + std::to_string(lights_[i].profile) +
+                    " is none of the scene's profiles");
   if (environment_.texture >= 0 && static_cast<size_t>(environment_.texture) >= textures_.size())
     fail_argument("environment.texture = " + std::to_string(environment_.texture) + " is out of range: the scene has " +
                   std::to_string(textures_.size()) + " textures");

@@ -12,6 +12,7 @@
 #include "core/fields.h"
 #include "scene/camera.h"
 #include "scene/light.h"
+#include "scene/light_profile.h"
 #include "scene/material.h"
 #include "scene/surface_interaction.h"
 #include "scene/texture.h"
@@ -58,7 +59,8 @@ class Scene final : private HitFilter {
   // Empty vectors: unchanged. Counts must be as before.
   void update_mesh(uint32_t id, std::vector<Vec3f> positions, std::vector<Vec3f> normals,
                    std::vector<Transform> instances);
-  void set_lights(std::vector<Light> lights);
+  // `profiles`: those that the lights name.
+  void set_lights(std::vector<Light> lights, LightProfiles profiles = {});
   void set_environment(const Environment& environment);
   void set_camera(const Camera& camera);
   void set_trace(AccelFactory factory);  // empty: ours again
@@ -74,8 +76,8 @@ class Scene final : private HitFilter {
   // others.
   template <typename Visit>
   void for_each_part(Visit&& visit) const {
-    const auto& [config, textures, materials, glass, coated, meshes, lights, environment, camera, has_camera, trace,
-                 accel, first_instance, instanced, committed, version, bounds, radius, epsilon] = *this;
+    const auto& [config, textures, materials, glass, coated, meshes, lights, profiles, environment, camera, has_camera,
+                 trace, accel, first_instance, instanced, committed, version, bounds, radius, epsilon] = *this;
     const bool host_trace = trace != nullptr;
     visit("accel", config);
     visit("host_trace", host_trace);
@@ -85,6 +87,7 @@ class Scene final : private HitFilter {
     visit("lights", lights);
     visit("environment", environment);
     visit("camera", camera);
+    visit("light profiles", profiles);
   }
 
   const Accel& accel() const { return *accel_; }
@@ -92,6 +95,7 @@ class Scene final : private HitFilter {
   const std::vector<Material>& materials() const { return materials_; }
   const std::vector<Texture>& textures() const { return textures_; }
   const std::vector<Light>& lights() const { return lights_; }
+  const LightProfiles& profiles() const { return profiles_; }
   const Environment& environment() const { return environment_; }
   const Camera& camera() const { return camera_; }
   bool has_camera() const { return has_camera_; }
@@ -153,6 +157,7 @@ class Scene final : private HitFilter {
   bool coated_ = false;
   std::vector<Mesh> meshes_;
   std::vector<Light> lights_;
+  LightProfiles profiles_;
   Environment environment_;
   Camera camera_;
   bool has_camera_ = false;

@@ -56,7 +56,7 @@ class LightSlice final : public Integrator {
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
     const float clamp = clamp_distance(params, scene);
-    clamp2_ = clamp * clamp;
+    falloff_ = {clamp * clamp, vpls.profiles};
     slices_ = static_cast<size_t>(params.integer("slices"));
     columns_ = static_cast<size_t>(params.integer("columns"));
     lights_ = order_lights(vpls.lights, &context.progress);
@@ -110,7 +110,7 @@ class LightSlice final : public Integrator {
         features.push_back(point_feature(points, slices.representatives[s], scene_->radius()));
       }
       rows.finish();
-      matrix = LightMatrix::build(*scene_, lights_, rows, clamp2_, kShadowedShare, context.progress);
+      matrix = LightMatrix::build(*scene_, lights_, rows, falloff_, kShadowedShare, context.progress);
       total.rays += matrix.rays();
       timer.add(SharedTimer::rows, SharedTimer::seconds_since(start));
       start = SharedTimer::now();
@@ -190,7 +190,7 @@ class LightSlice final : public Integrator {
       own.finish();
       for (size_t first = 0; first < ids.size(); first += kMaxLit) {
         const size_t n = std::min(kMaxLit, ids.size() - first);
-        total.clusters += sum_lights(scene_->accel(), lights[slot], clamp2_, own, first, n, context.progress, *work,
+        total.clusters += sum_lights(scene_->accel(), lights[slot], falloff_, own, first, n, context.progress, *work,
                                      sums.data(), rays.data());
         for (size_t i = 0; i < n; ++i) {
           radiance[ids[first + i]] = sums[i];
@@ -206,7 +206,7 @@ class LightSlice final : public Integrator {
   const Scene* scene_ = nullptr;
   std::vector<Vpl> lights_;
   std::vector<std::vector<float>> times_;  // of each choice of representatives
-  float clamp2_ = 0.0f;
+  Falloff falloff_ = 0.0f;
   size_t slices_ = 0, columns_ = 0;
 };
 

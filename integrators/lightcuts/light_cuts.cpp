@@ -29,7 +29,7 @@ HWY_INLINE void Increment(hn::Mask<D> mask, uint32_t* counts) {
 
 // Unshadowed estimates of the points in `active`, and which of them get any.
 template <VplKind kKind, Lobes kLobes>
-HWY_INLINE uint32_t Estimate(const Vpl& light, const Rgb& intensity, float clamp2, const PointBlock& block,
+HWY_INLINE uint32_t Estimate(const Vpl& light, const Rgb& intensity, Falloff falloff, const PointBlock& block,
                              uint32_t active, float* r, float* g, float* b) {
   const D d;
   uint32_t lit = 0;
@@ -43,7 +43,7 @@ HWY_INLINE uint32_t Estimate(const Vpl& light, const Rgb& intensity, float clamp
       f = SphereRadiance<kLobes, true>(d, light, block, i, Load3(d, block.position, i), normal, to_light);
       geometry = hn::Set(d, 1.0f), reached = MaskOf(d, active, i);
     } else {
-      geometry = Geometry<kKind>(d, light, clamp2, Load3(d, block.position, i), normal, to_light);
+      geometry = Geometry<kKind>(d, light, falloff, Load3(d, block.position, i), normal, to_light);
       reached = hn::And(hn::Gt(geometry, hn::Zero(d)), MaskOf(d, active, i));
       f = Reflectance<kLobes>(d, block, i, normal, to_light);
     }
@@ -57,32 +57,32 @@ HWY_INLINE uint32_t Estimate(const Vpl& light, const Rgb& intensity, float clamp
 }
 
 template <VplKind kKind>
-HWY_INLINE uint32_t EstimateOfKind(const Vpl& light, const Rgb& intensity, float clamp2, const PointBlock& block,
+HWY_INLINE uint32_t EstimateOfKind(const Vpl& light, const Rgb& intensity, Falloff falloff, const PointBlock& block,
                                    uint32_t active, float* r, float* g, float* b) {
-  if (block.ggx) return Estimate<kKind, Lobes::ggx>(light, intensity, clamp2, block, active, r, g, b);
-  return block.glossy ? Estimate<kKind, Lobes::cosine>(light, intensity, clamp2, block, active, r, g, b)
-                      : Estimate<kKind, Lobes::none>(light, intensity, clamp2, block, active, r, g, b);
+  if (block.ggx) return Estimate<kKind, Lobes::ggx>(light, intensity, falloff, block, active, r, g, b);
+  return block.glossy ? Estimate<kKind, Lobes::cosine>(light, intensity, falloff, block, active, r, g, b)
+                      : Estimate<kKind, Lobes::none>(light, intensity, falloff, block, active, r, g, b);
 }
 
-HWY_NOINLINE uint32_t EstimateOf(const Vpl& light, const Rgb& intensity, float clamp2, const PointBlock& block,
+HWY_NOINLINE uint32_t EstimateOf(const Vpl& light, const Rgb& intensity, Falloff falloff, const PointBlock& block,
                                  uint32_t active, float* r, float* g, float* b) {
   switch (light.kind) {
     case VplKind::omni:
-      return EstimateOfKind<VplKind::omni>(light, intensity, clamp2, block, active, r, g, b);
+      return EstimateOfKind<VplKind::omni>(light, intensity, falloff, block, active, r, g, b);
     case VplKind::oriented:
-      return EstimateOfKind<VplKind::oriented>(light, intensity, clamp2, block, active, r, g, b);
+      return EstimateOfKind<VplKind::oriented>(light, intensity, falloff, block, active, r, g, b);
     case VplKind::directional:
-      return EstimateOfKind<VplKind::directional>(light, intensity, clamp2, block, active, r, g, b);
+      return EstimateOfKind<VplKind::directional>(light, intensity, falloff, block, active, r, g, b);
     case VplKind::spot:
-      return EstimateOfKind<VplKind::spot>(light, intensity, clamp2, block, active, r, g, b);
+      return EstimateOfKind<VplKind::spot>(light, intensity, falloff, block, active, r, g, b);
     case VplKind::sphere:
-      return EstimateOfKind<VplKind::sphere>(light, intensity, clamp2, block, active, r, g, b);
+      return EstimateOfKind<VplKind::sphere>(light, intensity, falloff, block, active, r, g, b);
   }
   return 0;
 }
 
 // Traces the shadow rays of a new representative; what is hidden adds nothing.
-HWY_INLINE void TraceEstimates(const Accel& accel, const Vpl& light, const Rgb& intensity, float clamp2, CutEntry& e,
+HWY_INLINE void TraceEstimates(const Accel& accel, const Vpl& light, const Rgb& intensity, Falloff falloff, CutEntry& e,
                                LightCuts& cuts) {
   const D d;
   uint32_t lit[kCutGroups] = {};
@@ -92,7 +92,7 @@ HWY_INLINE void TraceEstimates(const Accel& accel, const Vpl& light, const Rgb& 
     if (e.active[g] == 0) continue;
     const PointBlock& block = cuts.blocks[g];
     lit[g] =
-        EstimateOf(light, intensity, clamp2, block, e.active[g], e.estimate[0][g], e.estimate[1][g], e.estimate[2][g]);
+        EstimateOf(light, intensity, falloff, block, e.active[g], e.estimate[0][g], e.estimate[1][g], e.estimate[2][g]);
     if (lit[g] == 0) continue;
     for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
       const auto mask = MaskOf(d, lit[g], i);
@@ -138,7 +138,7 @@ void AddNode(const LightTree& tree, const Accel& accel, const CutOptions& o, uin
   for (size_t g = 0; g < kCutGroups; ++g) {
     e.active[g] = 0;
     if (active[g] == 0) continue;
-    NodeBounds(node, cuts.blocks[g], o.clamp2, e.bound[g]);
+    NodeBounds(node, cuts.blocks[g], o.falloff.clamp2, e.bound[g]);
     uint32_t reached = 0;
     for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
       const auto asked = MaskOf(d, active[g], i);
@@ -167,7 +167,7 @@ void AddNode(const LightTree& tree, const Accel& accel, const CutOptions& o, uin
               e.estimate[k][g] + i);
     }
   } else {
-    TraceEstimates(accel, tree.lights()[e.representative], node.intensity, o.clamp2, e, cuts);
+    TraceEstimates(accel, tree.lights()[e.representative], node.intensity, o.falloff, e, cuts);
   }
 
   V excess = zero;

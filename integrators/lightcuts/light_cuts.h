@@ -8,6 +8,7 @@
 #include "clustering/bounds.h"
 #include "clustering/light_tree.h"
 #include "core/progress.h"
+#include "lights/falloff.h"
 
 namespace lumicut {
 
@@ -15,7 +16,7 @@ inline constexpr size_t kCutGroups = 4;
 inline constexpr size_t kCutPoints = kCutGroups * kLanes;
 
 struct CutOptions {
-  float clamp2 = 0.0f;  // as in light_points
+  Falloff falloff = 0.0f;
   float error = 0.02f;  // largest share of a point's luminance that a cluster's bound may reach
   uint32_t max_cut = 0xffffffffu;
   uint32_t slot = 0;                   // of LightTree::representative

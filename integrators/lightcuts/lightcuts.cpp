@@ -20,7 +20,7 @@ class Lightcuts final : public Integrator {
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
     const float clamp = clamp_distance(params, scene);
-    clamp2_ = clamp * clamp;
+    falloff_ = {clamp * clamp, vpls.profiles};
     error_ = kClusterShare * static_cast<float>(params.real("error"));
     const auto limit = params.integer("max_cut");
     max_cut_ = limit == 0 ? std::numeric_limits<uint32_t>::max() : static_cast<uint32_t>(limit);
@@ -41,7 +41,7 @@ class Lightcuts final : public Integrator {
       for (size_t first = begin; first < end; first += kCutPoints) {
         if (context.progress.cancelled()) return;
         const size_t count = std::min(kCutPoints, end - first);
-        CutOptions options{clamp2_, error_, max_cut_, 0, &context.progress};
+        CutOptions options{falloff_, error_, max_cut_, 0, &context.progress};
         if (tree_.slot_count() > 1)
           options.slot = Rng(seed_, Stage::representative, points.pixel[first], first).next_below(tree_.slot_count());
         cuts->grow(tree_, scene_->accel(), options, points, first, count);
@@ -62,7 +62,8 @@ class Lightcuts final : public Integrator {
  private:
   const Scene* scene_ = nullptr;
   LightTree tree_;
-  float clamp2_ = 0.0f, error_ = 0.02f;
+  Falloff falloff_ = 0.0f;
+  float error_ = 0.02f;
   uint32_t max_cut_ = 0;
   uint64_t seed_ = 1;
 };

@@ -147,7 +147,7 @@ struct Workspace {
 class Wspd final : public Integrator {
  public:
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
-    take(scene, params);
+    take(scene, vpls, params);
     {
       const PhaseTimer timer(context.stats, "well-separated pairs");
       WspdTree::Options options;
@@ -156,6 +156,7 @@ class Wspd final : public Integrator {
       options.seed = static_cast<uint64_t>(params.integer("seed"));
       options.epsilon = scene.epsilon();
       options.accel = cubemaps_ ? &scene.accel() : nullptr;
+      options.profiles = &vpls.profiles;
       tree_ = WspdTree::build(vpls.lights, options, context.progress);
     }
     tell(context.stats);
@@ -184,17 +185,17 @@ class Wspd final : public Integrator {
 
   void load_state(const Scene& scene, const VplSet& vpls, const Params& params, std::span<const uint8_t> bytes,
                   ShadeContext context) override {
-    take(scene, params);
-    tree_ = WspdTree::load(bytes);
+    take(scene, vpls, params);
+    tree_ = WspdTree::load(bytes, vpls.profiles);
     if (tree_.lights().size() > vpls.lights.size()) fail_argument("wspd state: it has more lights than there are");
     tell(context.stats);
   }
 
  private:
-  void take(const Scene& scene, const Params& params) {
+  void take(const Scene& scene, const VplSet& vpls, const Params& params) {
     scene_ = &scene;
     const float clamp = clamp_distance(params, scene);
-    clamp2_ = clamp * clamp;
+    falloff_ = {clamp * clamp, vpls.profiles};
     separation_ = static_cast<float>(params.real("separation"));
     point_separation_ = separation_ / (1.0f - separation_);
     bright_ = static_cast<float>(params.real("bright"));
@@ -229,7 +230,7 @@ class Wspd final : public Integrator {
       if ((agreed && cluster.seen == 0) || cluster.share == 0.0f) continue;
       ++used;
       if (agreed && cluster.seen == cluster.lit)
-        light_block(tree_.groups(tree_.node(cluster.node)), cluster.share, clamp2_, blocks.points, block.first,
+        light_block(tree_.groups(tree_.node(cluster.node)), cluster.share, falloff_, blocks.points, block.first,
                     block.count, true, work.sum);
       else
         for (size_t first = 0; first < block.count; first += kPart)
@@ -293,7 +294,7 @@ class Wspd final : public Integrator {
     } else {
       c.origin = representative(n, block.box.center());
     }
-    light_block(lights, 1.0f, clamp2_, blocks.samples, b * kSamples, kSamples, false, work.part);
+    light_block(lights, 1.0f, falloff_, blocks.samples, b * kSamples, kSamples, false, work.part);
     uint32_t lit[kSamples];
     for (uint32_t s = 0; s < kSamples; ++s) {
       c.luminance[s] = luminance({work.part.r[s], work.part.g[s], work.part.b[s]});
@@ -366,7 +367,7 @@ class Wspd final : public Integrator {
   // block.
   void shade_part(const Cluster& c, const ShadePoints& points, size_t first, size_t count, size_t offset,
                   Workspace& work) const {
-    light_block(tree_.groups(tree_.node(c.node)), c.share, clamp2_, points, first, count, false, work.part);
+    light_block(tree_.groups(tree_.node(c.node)), c.share, falloff_, points, first, count, false, work.part);
     uint32_t lit = 0;
     for (uint32_t i = 0; i < count; ++i)
       if (work.part.r[i] + work.part.g[i] + work.part.b[i] > 0.0f) work.index[lit++] = i;
@@ -398,7 +399,8 @@ class Wspd final : public Integrator {
 
   const Scene* scene_ = nullptr;
   WspdTree tree_;
-  float clamp2_ = 0.0f, separation_ = 0.25f, point_separation_ = 1.0f / 3.0f, bright_ = 0.01f;
+  Falloff falloff_ = 0.0f;
+  float separation_ = 0.25f, point_separation_ = 1.0f / 3.0f, bright_ = 0.01f;
   bool sampling_ = true, cubemaps_ = true;
   size_t largest_block_ = kBlock;
 };

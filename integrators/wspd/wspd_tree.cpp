@@ -8,7 +8,7 @@
 
 #include "core/parallel.h"
 #include "core/rng.h"
-#include "lights/light_profile.h"
+#include "lights/falloff.h"
 
 namespace lumicut {
 
@@ -60,7 +60,7 @@ Vpl mean_light(std::span<const Vpl> lights, const std::vector<uint8_t>& group_of
   return out;
 }
 
-float cosine_towards(const Vpl& v, const Vec3f& direction) {
+float intensity_share(const Vpl& v, const Falloff& falloff, const Vec3f& direction) {
   const float c = dot(v.normal, direction);
   switch (v.kind) {
     case VplKind::omni:
@@ -69,7 +69,7 @@ float cosine_towards(const Vpl& v, const Vec3f& direction) {
     case VplKind::sphere:
       return std::max(0.0f, c);
     case VplKind::spot:
-      return spot_profile(v, direction);
+      return falloff.of_spot(v, direction);
     case VplKind::directional:
       break;
   }
@@ -315,6 +315,8 @@ void WspdTree::find_groups(const Options& options, Progress& progress) {
 // Eq. 2.21, with at most kSampled of the cluster's lights.
 void WspdTree::find_cubemaps(const Options& options, Progress& progress) {
   constexpr size_t kChunk = 64, kSampled = 6;
+  Falloff falloff = 0.0f;
+  falloff.profiles = options.profiles;
   const std::vector<uint8_t> used = used_nodes();
   progress.begin("local visibility", nodes_.size());
   std::vector<std::vector<Cubemap>> parts((nodes_.size() + kChunk - 1) / kChunk);
@@ -338,7 +340,7 @@ void WspdTree::find_cubemaps(const Options& options, Progress& progress) {
         const Vec3f from = v.position - node.center;
         for (uint32_t cell = 0; cell < kCubeCells; ++cell) {
           const Vec3f d = cube_direction(cell);
-          const float weight = luminance(v.intensity) * cosine_towards(v, d);
+          const float weight = luminance(v.intensity) * intensity_share(v, falloff, d);
           if (!(weight > 0.0f)) continue;
           // Where the ray leaves the ball.
           const float b = dot(from, d);
@@ -493,7 +495,7 @@ void WspdTree::save(std::vector<uint8_t>& out) const {
   write_array(out, distant_);
 }
 
-WspdTree WspdTree::load(std::span<const uint8_t> bytes) {
+WspdTree WspdTree::load(std::span<const uint8_t> bytes, const LightProfiles& profiles) {
   WspdTree t;
   Reader in(bytes);
   in.value(t.cube_.lower), in.value(t.cube_.side), in.value(t.cube_.shift), in.value(t.root_);
@@ -501,12 +503,12 @@ WspdTree WspdTree::load(std::span<const uint8_t> bytes) {
   in.array(t.pair_begin_), in.array(t.pairs_), in.array(t.groups_), in.array(t.cubemaps_);
   in.array(t.distant_);
   in.end();
-  t.check();
+  t.check(profiles);
   return t;
 }
 
 // All that following an index, choosing a cell and shading rely on.
-void WspdTree::check() const {
+void WspdTree::check(const LightProfiles& profiles) const {
   const auto require = [](bool ok, const char* what) {
     if (!ok) fail_argument(std::string("wspd state: ") + what + " make no sense");
   };
@@ -516,7 +518,7 @@ void WspdTree::check() const {
     return static_cast<uint32_t>(v.kind) < kVplKinds && is_finite(v.position) && is_finite(v.normal) &&
            positive(v.intensity.x) && positive(v.intensity.y) && positive(v.intensity.z) &&
            std::isfinite(v.edge_or_radius) && std::isfinite(v.blend_cosine) && std::isfinite(v.spot_cosine) &&
-           std::isfinite(v.spread_tan) && (v.profile == 0 || find_profile(v.profile) != nullptr);
+           std::isfinite(v.spread_tan) && (v.profile == 0 || profiles.find(v.profile) != nullptr);
   };
   require(is_finite(cube_.lower) && positive(cube_.side) && cube_.side > 0.0f, "bounds");
   for (const double s : cube_.shift) require(s >= 0.0 && s <= 1.0, "bounds");

@@ -48,8 +48,9 @@ class WspdTree {
     float separation = 0.25f;        // ε of Def. 2.1
     float normal_threshold = 0.01f;  // of Alg. 3: distance between unit normals
     uint64_t seed = 1;
-    const Accel* accel = nullptr;  // null: no cubemaps
-    float epsilon = 0.0f;          // the scene's: smaller clusters have no visibility of their own
+    const Accel* accel = nullptr;             // null: no cubemaps
+    float epsilon = 0.0f;                     // the scene's: smaller clusters have no visibility of their own
+    const LightProfiles* profiles = nullptr;  // those that the lights name; null: none do
   };
 
   // Lights without intensity are left out. Throws Error(cancelled), Error(out_of_memory) at more than 2^32 pairs.
@@ -85,8 +86,9 @@ class WspdTree {
   size_t cubemap_count() const { return cubemaps_.size(); }
 
   void save(std::vector<uint8_t>& out) const;
-  // Throws Error(invalid_argument) where the bytes do not hold a tree; all indices are checked.
-  static WspdTree load(std::span<const uint8_t> bytes);
+  // Throws Error(invalid_argument) where the bytes do not hold a tree, or one whose lights name other profiles; all
+  // indices are checked.
+  static WspdTree load(std::span<const uint8_t> bytes, const LightProfiles& profiles = {});
 
  private:
   struct Cube {
@@ -102,7 +104,7 @@ class WspdTree {
   void find_groups(const Options& options, Progress& progress);
   void find_cubemaps(const Options& options, Progress& progress);
   std::vector<uint8_t> used_nodes() const;
-  void check() const;
+  void check(const LightProfiles& profiles) const;
 
   Cube cube_;
   std::vector<Vpl> lights_;

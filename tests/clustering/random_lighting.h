@@ -1,7 +1,10 @@
 // Random points, lights and clusters of every kind and size.
 #pragma once
 
-#include "lights/light_profile.h"
+#include <array>
+#include <memory>
+
+#include "lights/falloff.h"
 #include "lights/vpl.h"
 #include "tests/support/test_scenes.h"
 
@@ -35,6 +38,25 @@ inline ShadePoints random_points(Rng& rng, size_t n, float half, bool glossy) {
   return points;
 }
 
+inline const std::array<ProfileRef, 2>& random_tables() {
+  static const std::array<ProfileRef, 2> tables = {
+      std::make_shared<LightProfile>(std::vector<float>{0.0f, 0.7f, 1.1f, 3.1f}, std::vector<float>{0.0f},
+                                     std::vector<float>{1.0f, 3.0f, 0.5f, 0.1f}),
+      std::make_shared<LightProfile>(std::vector<float>{0.0f, 0.5f, 1.0f, 1.5f},
+                                     std::vector<float>{0.0f, 1.5f, 4.0f, 6.2831853f},
+                                     std::vector<float>{1, 2, 1, 0, 1, 0, 3, 0, 1, 4, 0, 0, 1, 2, 1, 0})};
+  return tables;
+}
+// Those that random lights have.
+inline const LightProfiles& random_profiles() {
+  static const LightProfiles all = [] {
+    LightProfiles p;
+    for (const ProfileRef& table : random_tables()) p.add(table);
+    return p;
+  }();
+  return all;
+}
+
 inline Vpl random_light(Rng& rng, VplKind kind, float half) {
   Vpl v;
   v.kind = kind;
@@ -49,13 +71,10 @@ inline Vpl random_light(Rng& rng, VplKind kind, float half) {
     v.spread_tan = rng.next_below(2) == 0 ? 0.0f : 4.0f * rng.next_float();
     if (v.spread_tan > 0) v.spot_cosine = 1.0f;
     if (rng.next_below(3) == 0) {
-      static const ProfileRef kProfiles[2] = {
-          keep_profile(LightProfile({0.0f, 0.7f, 1.1f, 3.1f}, {0.0f}, {1.0f, 3.0f, 0.5f, 0.1f})),
-          keep_profile(LightProfile({0.0f, 0.5f, 1.0f, 1.5f}, {0.0f, 1.5f, 4.0f, 6.2831853f},
-                                    {1, 2, 1, 0, 1, 0, 3, 0, 1, 4, 0, 0, 1, 2, 1, 0}))};
-      v.profile = kProfiles[rng.next_below(2)]->id();
+      const LightProfile& profile = *random_tables()[rng.next_below(2)];
+      v.profile = profile.id();
       const Vec3f tangent = Frame(v.normal).t;
-      v.cos_outer() = find_profile(v.profile)->cos_outer();
+      v.cos_outer() = profile.cos_outer();
       v.blend_cosine = tangent.x, v.spot_cosine = tangent.y, v.spread_tan = tangent.z;
     }
   }

@@ -34,8 +34,8 @@ TEST(Bounds, AMillionRandomPairsNeverPassTheBoundOfTheirCluster) {
           continue;
         }
         for (size_t i = 0; i < kLanes; ++i) {
-          const float value =
-              luminance(light_point(tree.lights()[below.light], node.intensity, clamp * clamp, points.get(i)));
+          const float value = luminance(light_point(tree.lights()[below.light], node.intensity,
+                                                    {clamp * clamp, test::random_profiles()}, points.get(i)));
           ASSERT_LE(value, bounds[i]) << "trial " << trial << " node " << n << " point " << i << " kind "
                                       << static_cast<int>(kind) << " glossy " << glossy;
           tight += value > 0.9f * bounds[i];

@@ -30,7 +30,7 @@ struct Lighting {
     lights = order_lights(made);
     rows = test::random_points(rng, row_count, 0.95f, true);
     const Progress progress;
-    matrix = LightMatrix::build(*scene, lights, rows, 0.01f, 0.0f, progress);
+    matrix = LightMatrix::build(*scene, lights, rows, {0.01f, test::random_profiles()}, 0.0f, progress);
   }
 };
 
@@ -63,13 +63,15 @@ TEST(LightMatrix, BfloatRoundsToNearestOverTheWholeRange) {
 TEST(LightMatrix, EntriesAreWhatTheLightGivesToTheRow) {
   const Lighting s(600);
   const Progress progress;
-  const LightMatrix open = LightMatrix::build(*s.scene, s.lights, s.rows, 0.01f, 1.0f, progress);
+  const LightMatrix open =
+      LightMatrix::build(*s.scene, s.lights, s.rows, {0.01f, test::random_profiles()}, 1.0f, progress);
   size_t shadowed = 0;
   std::vector<double> sums(s.rows.size());
   for (size_t l = 0; l < s.lights.size(); ++l)
     for (size_t r = 0; r < s.rows.size(); ++r) {
       const SurfacePoint p = s.rows.get(r);
-      const float free = luminance(light_point(s.lights[l], s.lights[l].intensity, 0.01f, p));
+      const float free =
+          luminance(light_point(s.lights[l], s.lights[l].intensity, {0.01f, test::random_profiles()}, p));
       const float entry = from_bfloat(s.matrix.column(l)[r]);
       // 8 bits, and single precision at grazing angles.
       EXPECT_NEAR(from_bfloat(open.column(l)[r]), free, 0.005f * free + 1e-5f);

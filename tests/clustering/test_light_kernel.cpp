@@ -13,10 +13,10 @@ TEST(LightKernel, EqualsPlainArithmeticForEveryKindOfLightAndMaterial) {
       const Vpl light = test::random_light(rng, static_cast<VplKind>(trial % kVplKinds), 1.5f);
       const float clamp2 = 0.01f;
       auto lit = std::make_unique<LitPoints>();
-      light_points(light, light.intensity, clamp2, points, 0, points.size(), *lit);
+      light_points(light, light.intensity, {clamp2, test::random_profiles()}, points, 0, points.size(), *lit);
       size_t next = 0;
       for (size_t i = 0; i < points.size(); ++i) {
-        const Rgb expected = light_point(light, light.intensity, clamp2, points.get(i));
+        const Rgb expected = light_point(light, light.intensity, {clamp2, test::random_profiles()}, points.get(i));
         Rgb got{};
         if (next < lit->count && lit->index[next] == i) {
           got = {lit->r[next], lit->g[next], lit->b[next]};
@@ -43,7 +43,7 @@ TEST(LightKernel, LightOnThePointItselfStaysFinite) {
   light.intensity = {1, 1, 1};
   for (const float clamp2 : {0.0f, 0.25f}) {
     LitPoints lit;
-    light_points(light, light.intensity, clamp2, points, 0, points.size(), lit);
+    light_points(light, light.intensity, {clamp2, test::random_profiles()}, points, 0, points.size(), lit);
     for (size_t i = 0; i < lit.count; ++i) EXPECT_TRUE(std::isfinite(lit.r[i]));
   }
 }

@@ -71,7 +71,7 @@ TEST(PairBounds, AMillionRandomPairsNeverPassTheBoundOfTheirClusters) {
           for (size_t i = 0; i < clusters[lane].size(); ++i) {
             const SurfacePoint p = clusters[lane].get(i);
             // The worst light takes all of the node's intensity, as a representative would.
-            const float value = luminance(light_point(light, node.intensity, clamp2, p));
+            const float value = luminance(light_point(light, node.intensity, {clamp2, test::random_profiles()}, p));
             ASSERT_LE(value, bounds[lane]) << "trial " << trial << " node " << n << " lane " << lane << " kind "
                                            << static_cast<int>(kind) << " glossy " << glossy;
             if (kind != VplKind::directional) {

@@ -41,6 +41,7 @@ WspdTree build(const std::vector<Vpl>& lights, float separation = 0.25f, const A
   WspdTree::Options options;
   options.separation = separation;
   options.accel = accel;
+  options.profiles = &test::random_profiles();
   return WspdTree::build(lights, options, progress);
 }
 
@@ -201,12 +202,12 @@ TEST(WspdTree, SavedTreesComeBackAndDamageIsFound) {
   const WspdTree tree = build(mixed_lights(500));
   std::vector<uint8_t> bytes, again;
   tree.save(bytes);
-  WspdTree::load(bytes).save(again);
+  WspdTree::load(bytes, test::random_profiles()).save(again);
   EXPECT_EQ(bytes, again);
   for (size_t keep = 0; keep < bytes.size(); keep += 1 + bytes.size() / 300)
-    EXPECT_THROW(WspdTree::load({bytes.data(), keep}), Error) << keep;
+    EXPECT_THROW(WspdTree::load({bytes.data(), keep}, test::random_profiles()), Error) << keep;
   bytes.push_back(0);
-  EXPECT_THROW(WspdTree::load(bytes), Error);
+  EXPECT_THROW(WspdTree::load(bytes, test::random_profiles()), Error);
   bytes.pop_back();
   // Any damage is either found or harmless: what loads has indices in range.
   Rng rng(4, Stage::test);
@@ -214,7 +215,7 @@ TEST(WspdTree, SavedTreesComeBackAndDamageIsFound) {
     std::vector<uint8_t> bad = bytes;
     bad[rng.next_below(static_cast<uint32_t>(bad.size()))] ^= static_cast<uint8_t>(1u << rng.next_below(8));
     try {
-      const WspdTree t = WspdTree::load(bad);
+      const WspdTree t = WspdTree::load(bad, test::random_profiles());
       for (uint32_t n = 0; n < t.nodes().size(); ++n) {
         for (const uint32_t v : t.pairs(n)) EXPECT_LT(v, t.nodes().size());
         for (const Vpl& g : t.groups(t.node(n))) EXPECT_LT(static_cast<uint32_t>(g.kind), uint32_t{kVplKinds});
@@ -233,7 +234,7 @@ TEST(WspdTree, NumbersThatAreNoneAreRefused) {
     std::vector<uint8_t> bad = bytes;
     bad[at + 2] = 0xff, bad[at + 3] = 0x7f;  // little-endian NaN, of a float and in a double's upper half
     if (at >= 2 * sizeof(double) && at % sizeof(double) == 0) continue;  // a double's lower half
-    EXPECT_THROW(WspdTree::load(bad), Error) << at;
+    EXPECT_THROW(WspdTree::load(bad, test::random_profiles()), Error) << at;
   }
 }
 

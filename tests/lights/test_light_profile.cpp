@@ -1,11 +1,14 @@
-#include "lights/light_profile.h"
+#include "scene/light_profile.h"
 
 #include <gtest/gtest.h>
 
 #include <numbers>
+#include <unordered_map>
 
 #include "core/error.h"
+#include "lights/falloff.h"
 #include "lights/light_sampler.h"
+#include "lights/trace_vpls.h"
 #include "tests/support/test_scenes.h"
 
 namespace lumicut {
@@ -28,13 +31,13 @@ LightProfile lopsided() {
 std::unique_ptr<Scene> lit_by(const LightProfile& profile) {
   auto scene = std::make_unique<Scene>(Scene::Config{});
   Light l;
-  static std::vector<ProfileRef> held;  // as long as the scenes
-  held.push_back(keep_profile(profile));
-  l.profile = held.back()->id();
+  LightProfiles profiles;
+  profiles.add(std::make_shared<LightProfile>(profile));
+  l.profile = profile.id();
   l.direction = normalize(Vec3f{1, -2, 0.5f});
   l.tangent = Frame(l.direction).t;
   l.value = {2, 2, 2};
-  scene->set_lights({l});
+  scene->set_lights({l}, std::move(profiles));
   Progress progress;
   scene->commit(progress);
   return scene;
@@ -90,38 +93,81 @@ TEST(LightProfile, PowerOfALampGoesRoundThroughItsPaths) {
   EXPECT_NEAR(flux / emitters.power(), 1.0, 0.01);
   ASSERT_EQ(emitters.delta_lights().size(), 1u) << "one VPL stands for it, exactly";
   const Vpl& v = emitters.delta_lights()[0];
+  const Falloff falloff(0.0f, scene->profiles());
   for (int i = 0; i < 1000; ++i) {
     Rng rng(i, Stage::test, 1);
     const Vec3f d = test::random_direction(rng);
-    const float share = spot_profile(v, d);
+    const float share = falloff.of_spot(v, d);
     EXPECT_LE(share, 1.0f);
     EXPECT_TRUE(dot(d, v.normal) >= v.cos_outer() || share == 0.0f);
   }
   const Vec3f bitangent = cross(v.tangent(), v.normal);
-  EXPECT_NEAR(spot_profile(v, -bitangent), 1.0 * 3 / 12, 1e-4) << "90 degrees down, 270 around";
+  EXPECT_NEAR(falloff.of_spot(v, -bitangent), 1.0 * 3 / 12, 1e-4) << "90 degrees down, 270 around";
 }
 
-TEST(LightProfile, OneOfTheSameContentIsKeptOnce) {
-  EXPECT_EQ(keep_profile(lopsided()), keep_profile(lopsided()));
-  const LightProfile other({0.0f, 1.0f}, {0.0f}, {1, 1});
-  EXPECT_NE(keep_profile(other), keep_profile(lopsided()));
-  EXPECT_EQ(find_profile(0), nullptr);
+TEST(LightProfiles, OneOfTheSameContentIsKeptOnce) {
+  LightProfiles profiles;
+  const auto first = std::make_shared<LightProfile>(lopsided());
+  profiles.add(first);
+  profiles.add(std::make_shared<LightProfile>(lopsided()));
+  EXPECT_EQ(profiles.find(first->id()), first.get());
+  const auto other =
+      std::make_shared<LightProfile>(std::vector<float>{0, 1}, std::vector<float>{0}, std::vector<float>{1, 1});
+  EXPECT_EQ(profiles.find(other->id()), nullptr);
+  profiles.add(other);
+  EXPECT_EQ(profiles.find(other->id()), other.get());
+  EXPECT_EQ(profiles.find(first->id()), first.get());
+  EXPECT_EQ(profiles.find(0), nullptr);
 }
 
-TEST(LightProfile, GoesWithTheLastWhoHoldsIt) {
-  const LightProfile table({0.0f, 1.25f}, {0.0f}, {3, 1});
-  const uint32_t id = table.id();
-  EXPECT_EQ(hold_profile(id), nullptr);
-  ProfileRef one = keep_profile(table), other = hold_profile(id);
-  EXPECT_EQ(find_profile(id), one.get());
-  one.reset();
-  EXPECT_EQ(find_profile(id), other.get());
-  other.reset();
-  EXPECT_EQ(find_profile(id), nullptr);
-  for (int i = 0; i < 20000; ++i)  // one after another there may be more than there is room for
-    one = keep_profile(LightProfile({0.0f, 1.0f}, {0.0f}, {1, static_cast<float>(i)}));
-  EXPECT_EQ(find_profile(one->id()), one.get());
-  EXPECT_EQ(find_profile(id), nullptr);
+TEST(LightProfiles, GoWithTheSceneAndTheLightsMadeOfIt) {
+  const LightProfile table = lopsided();
+  auto scene = lit_by(table);
+  std::weak_ptr<const LightProfile> held = scene->profiles().hold(table.id());
+  Progress progress;
+  auto vpls = std::make_unique<VplSet>(trace_vpls(*scene, {.count = 10}, progress));
+  scene.reset();
+  ASSERT_FALSE(held.expired());
+  EXPECT_GT(Falloff(0.0f, vpls->profiles).of_spot(vpls->lights[0], vpls->lights[0].normal), 0.0f);
+  vpls.reset();
+  EXPECT_TRUE(held.expired());
+}
+
+// Two tables whose names are the same by chance: names have 31 bits, so that among some 100,000 tables two meet.
+std::pair<LightProfile, LightProfile> namesakes() {
+  const auto table = [](int i) {
+    return LightProfile({0.0f, 1.0f, 2.0f}, {0.0f}, {1.0f, 1.0f, 1e-6f * static_cast<float>(1 + i)});
+  };
+  std::unordered_map<uint32_t, int> seen;
+  for (int i = 0;; ++i)
+    if (const auto [at, fresh] = seen.emplace(table(i).id(), i); !fresh) return {table(at->second), table(i)};
+}
+
+TEST(LightProfiles, OfTheSameNameDoNotMixBetweenScenes) {
+  const auto [one, other] = namesakes();
+  ASSERT_EQ(one.id(), other.id());
+  ASSERT_FALSE(one == other);
+  const auto a = lit_by(one), b = lit_by(other);
+  EXPECT_EQ(*a->profiles().find(one.id()), one);
+  EXPECT_EQ(*b->profiles().find(one.id()), other);
+  EXPECT_NE(LightSampler(*a).power(), LightSampler(*b).power());
+  EXPECT_NEAR(LightSampler(*a).power(), 2 * one.solid_angle(), 1e-4);
+  EXPECT_NEAR(LightSampler(*b).power(), 2 * other.solid_angle(), 1e-4);
+  // Within one scene neither could be told from the other.
+  LightProfiles both;
+  both.add(std::make_shared<LightProfile>(one));
+  EXPECT_THROW(both.add(std::make_shared<LightProfile>(other)), Error);
+  both.prefer(b->profiles());
+  EXPECT_EQ(*both.find(one.id()), other);
+}
+
+TEST(LightProfiles, ALightWithoutItsTableIsRefused) {
+  Scene scene{Scene::Config{}};
+  Light l;
+  l.profile = lopsided().id();
+  scene.set_lights({l});
+  Progress progress;
+  EXPECT_THROW(scene.commit(progress), Error);
 }
 
 TEST(LightProfile, TablesThatMakeNoSenseAreRefused) {

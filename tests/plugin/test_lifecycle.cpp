@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -94,6 +95,60 @@ TEST(Lifecycle, LeavesNothingBehind) {
   // The allocator's arenas settle at their own pace, but not with the number of lives: a profile that stays is 320 kB.
   EXPECT_LT(grown, 4000 + (lives - warm));
 #endif
+}
+
+// Tables of 160 kB: 1000 that stay would be 160 MB.
+TEST(Lifecycle, ProfilesGoWithTheirScene) {
+  const api::Device device(1);
+  constexpr int kScenes = 1000, kWarm = 50;
+  long memory = 0;
+  for (int n = 0; n < kScenes; ++n) {
+    if (n == kWarm) memory = process_status("VmRSS");
+    const api::Scene s(device);
+    add_measured_lamp(s, n);
+    api::check(lumicut_scene_commit(s.get()));
+  }
+  const long grown = process_status("VmRSS") - memory;
+  std::printf("%ld kB more after %d scenes\n", grown, kScenes - kWarm);
+#ifndef LUMICUT_SANITIZED
+  EXPECT_LT(grown, 4000) << "25 tables";
+#endif
+}
+
+// A light's `profile` is a number within its scene, and a virtual light's a name: neither finds another scene's table.
+TEST(Lifecycle, ScenesWithProfilesOfTheSameNumberDoNotMix) {
+  const api::Device device(1);
+  const auto lit_by = [&](int table) {
+    api::Scene s(device);
+    add_measured_lamp(s, table);
+    api::check(lumicut_scene_commit(s.get()));
+    return s;
+  };
+  const auto lights_of = [&](const api::Scene& s) {
+    api::Integrator i = integrator(device, 10);
+    i.prepare(s);
+    auto lights = i.lights();
+    std::erase_if(lights, [](const lumicut_vpl& v) { return v.profile == 0; });
+    return lights;
+  };
+  const api::Scene one = lit_by(1);
+  const auto alone = lights_of(one);
+  ASSERT_EQ(alone.size(), 1u);
+  api::Integrator host = integrator(device, 10);
+  {
+    const api::Scene other = lit_by(2);
+    EXPECT_NE(lights_of(other)[0].profile, alone[0].profile);
+    const auto again = lights_of(one);
+    EXPECT_EQ(std::memcmp(again.data(), alone.data(), alone.size() * sizeof(lumicut_vpl)), 0);
+    host.set_lights(lights_of(other));
+  }
+  host.prepare(one);  // the lights hold what they name, though its scene is gone
+  const auto theirs = host.lights();
+  api::Integrator late = integrator(device, 10);
+  late.set_lights(theirs);
+  host = integrator(device, 10), late = integrator(device, 10);
+  EXPECT_CODE(lumicut_integrator_set_lights(late.get(), theirs.data(), theirs.size()), LUMICUT_INVALID_ARGUMENT,
+              "is no profile that a scene was given");
 }
 
 TEST(Lifecycle, StatusCancelAndReleaseMayComeFromAnyThread) {

@@ -259,7 +259,7 @@ TEST(Resume, SaysWhatIsAnother) {
 TEST(Resume, DoesNotDependOnThreadsNorOnWhatWasBefore) {
   const Host host;
   const std::vector<uint8_t> from = checkpoint(api::Device(1), host);
-  // Profiles are kept for the whole process: others come first.
+  // Profiles are looked up by name: others come first.
   Host other;
   other.profiles[0].values[0] = 0.3f;
   const api::Device device(3);

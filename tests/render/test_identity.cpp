@@ -3,9 +3,9 @@
 
 #include <set>
 
-#include "lights/light_profile.h"
 #include "render/frame.h"
 #include "render/identity.h"
+#include "scene/light_profile.h"
 
 namespace {
 
@@ -27,6 +27,8 @@ class ChangeOne {
       if (!changed_.empty()) changed_ = std::string(name) + "." + changed_;
     } else if constexpr (std::is_array_v<T>) {
       for (auto& v : value) (*this)(name, v);
+    } else if constexpr (requires { value.use_count(); }) {
+      // Shared content has a test of its own.
     } else if constexpr (requires { value.front(); }) {
       // A list: one more, and another last element.
       if (take(name)) return value.push_back({});
@@ -104,8 +106,19 @@ TEST(Identity, EveryFieldOfATextureCounts) {
 TEST(Identity, EveryFieldOfALightProfileCounts) {
   EXPECT_EQ(expect_every_field_counts(LightProfile({0, 1, 2}, {0}, {1, 2, 1})), 11u);
 }
+TEST(Identity, LightProfilesCountByTheirContent) {
+  const auto hash = [](float value) {
+    LightProfiles profiles;
+    profiles.add(
+        std::make_shared<LightProfile>(std::vector<float>{0, 1}, std::vector<float>{0}, std::vector<float>{1, value}));
+    return hash_value(0, profiles);
+  };
+  EXPECT_EQ(hash(0.5f), hash(0.5f));
+  EXPECT_NE(hash(0.5f), hash(0.6f));
+  EXPECT_NE(hash(0.5f), hash_value(0, LightProfiles{}));
+}
 TEST(Identity, EveryFieldOfASetOfVirtualLightsCounts) {
-  EXPECT_EQ(expect_every_field_counts(VplSet{{Vpl{}, Vpl{}}, 3}), 18u);
+  EXPECT_EQ(expect_every_field_counts(VplSet{{Vpl{}, Vpl{}}, 3, {}}), 19u);
 }
 TEST(Identity, EveryFieldOfAScenesConfigurationCounts) { EXPECT_GE(expect_every_field_counts(Scene::Config{}), 3u); }
 

@@ -1,16 +1,13 @@
-// Measured lamps: intensity by direction, as photometric files have it. Tables live as long as somebody holds them and
-// are named by a hash of their content, so that VPLs carry the name through files, states and kernels alike.
+// Measured lights: intensity by direction, as photometric files have it. Tables belong to the scene whose lights use
+// them, and to the virtual lights made of these. Each is named by a hash of its content, so that lights carry the name
+// through files, states and kernels alike.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <memory>
-#include <string>
 #include <vector>
 
-#include "core/error.h"
 #include "core/fields.h"
-#include "core/vec.h"
 
 namespace lumicut {
 
@@ -47,27 +44,20 @@ class LightProfile {
 
 using ProfileRef = std::shared_ptr<const LightProfile>;
 
-// One of the same content is kept once. Its name is never 0. Throws Error where 4096 are kept already.
-ProfileRef keep_profile(LightProfile profile);
-// Of that name, where somebody holds it.
-ProfileRef hold_profile(uint32_t id);
-// The same for those who know that it is held meanwhile: lock-free. nullptr: none of that name.
-const LightProfile* find_profile(uint32_t id);
+// Those that a scene's lights use, or a set of virtual lights. One holder's names say nothing about another's.
+class LightProfiles {
+ public:
+  // One of the same content is kept once. Throws Error where another has its name by chance.
+  void add(const ProfileRef& profile);
+  // nullptr: none of that name.
+  const LightProfile* find(uint32_t id) const { return hold(id).get(); }
+  const ProfileRef& hold(uint32_t id) const;
+  // The other's tables beside its own, and in place of those of the same name.
+  void prefer(const LightProfiles& other);
 
-// All that these lights (lamps, or virtual ones) name, each once. Throws Error where nobody holds one of them.
-template <typename Lights>
-std::vector<ProfileRef> hold_profiles(const Lights& lights) {
-  std::vector<uint32_t> ids;
-  for (const auto& light : lights)
-    if (light.profile != 0 && (ids.empty() || ids.back() != light.profile)) ids.push_back(light.profile);
-  std::sort(ids.begin(), ids.end());
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  std::vector<ProfileRef> held;
-  for (const uint32_t id : ids) {
-    held.push_back(hold_profile(id));
-    if (held.back() == nullptr) fail_argument("light profile " + std::to_string(id) + ": no scene and no light has it");
-  }
-  return held;
-}
+ private:
+  std::vector<ProfileRef> tables_;  // their names rise
+  LUMICUT_FIELDS(LightProfiles, tables_)
+};
 
 }  // namespace lumicut

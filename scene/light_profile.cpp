@@ -1,24 +1,19 @@
-#include "lights/light_profile.h"
+#include "scene/light_profile.h"
 
 #include <algorithm>
-#include <array>
-#include <atomic>
 #include <bit>
 #include <cmath>
-#include <mutex>
 #include <numbers>
 #include <string>
 
 #include "core/error.h"
 #include "core/rng.h"
-#include "lights/vpl.h"
 
 namespace lumicut {
 
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr size_t kMostProfiles = 4096, kSlots = 16384;
 
 void check_rising(const std::vector<float>& angles, const char* name, double last) {
   for (size_t i = 0; i < angles.size(); ++i) {
@@ -35,52 +30,6 @@ void check_rising(const std::vector<float>& angles, const char* name, double las
 double ring(double a, double b, double t0, double t1) {
   const double slope = (b - a) / (t1 - t0);
   return a * std::cos(t0) - b * std::cos(t1) + slope * (std::sin(t1) - std::sin(t0));
-}
-
-// By name, with open addressing. Only a slot of the name that is looked for is read beyond its name, and who looks for
-// one holds it: so it stays what it is meanwhile, and looking needs no lock.
-struct Slot {
-  std::atomic<uint32_t> id{0};
-  std::atomic<const LightProfile*> profile{nullptr};
-  std::weak_ptr<const LightProfile> held;  // under the mutex
-};
-constexpr uint32_t kFree = 0, kFreed = 2;  // names are odd
-
-struct Registry {
-  std::array<Slot, kSlots> slots;
-  std::mutex mutex;
-  size_t count = 0;
-};
-// Never destroyed: profiles go while static objects do.
-Registry& registry() {
-  static Registry& r = *new Registry;
-  return r;
-}
-
-Slot* slot_of(uint32_t id) {
-  Registry& r = registry();
-  for (size_t i = hash64(id) % kSlots, n = 0; n < kSlots; i = (i + 1) % kSlots, ++n) {
-    const uint32_t found = r.slots[i].id.load(std::memory_order_acquire);
-    if (found == id) return &r.slots[i];
-    if (found == kFree) break;
-  }
-  return nullptr;
-}
-
-// The last who held it has let it go; somebody else may have kept one of the same name since.
-void forget(const LightProfile* profile) {
-  Registry& r = registry();
-  {
-    const std::lock_guard lock(r.mutex);
-    Slot* const slot = slot_of(profile->id());
-    if (slot != nullptr && slot->profile.load(std::memory_order_relaxed) == profile) {
-      slot->profile.store(nullptr, std::memory_order_relaxed);
-      slot->held.reset();
-      slot->id.store(kFreed, std::memory_order_release);
-      --r.count;
-    }
-  }
-  delete profile;
 }
 
 }  // namespace
@@ -161,53 +110,36 @@ void LightProfile::sample(double u, float v, float w, float& vertical, float& ho
   pdf = static_cast<float>((cdf_[cell + 1] - cdf_[cell]) / (cdf_.back() * solid));
 }
 
-ProfileRef keep_profile(LightProfile profile) {
-  Registry& r = registry();
-  const uint32_t id = profile.id();
-  // Made before the lock is taken and freed after it is gone: what frees one takes it too.
-  ProfileRef made(new LightProfile(std::move(profile)), forget);
-  ProfileRef old;
-  const std::lock_guard lock(r.mutex);
-  Slot* slot = slot_of(id);
-  if (slot != nullptr) {
-    old = slot->held.lock();
-    if (old != nullptr) {
-      if (!(*old == *made)) throw Error(ErrorCode::unsupported, "two light profiles share one name by chance");
-      return old;
-    }
-  } else {
-    if (r.count >= kMostProfiles) throw Error(ErrorCode::unsupported, "more than 4096 different light profiles");
-    ++r.count;
-    size_t i = hash64(id) % kSlots;
-    while ((r.slots[i].id.load(std::memory_order_relaxed) & 1u) != 0) i = (i + 1) % kSlots;
-    slot = &r.slots[i];
+namespace {
+template <typename Tables>
+auto place_of(Tables& tables, uint32_t id) {
+  return std::lower_bound(tables.begin(), tables.end(), id,
+                          [](const ProfileRef& p, uint32_t name) { return p->id() < name; });
+}
+}  // namespace
+
+void LightProfiles::add(const ProfileRef& profile) {
+  const auto at = place_of(tables_, profile->id());
+  if (at == tables_.end() || (*at)->id() != profile->id())
+    tables_.insert(at, profile);
+  else if (!(**at == *profile))
+    throw Error(ErrorCode::unsupported, "two light profiles share one name by chance");
+}
+
+const ProfileRef& LightProfiles::hold(uint32_t id) const {
+  static const ProfileRef kNone;
+  const auto at = place_of(tables_, id);
+  return at != tables_.end() && (*at)->id() == id ? *at : kNone;
+}
+
+void LightProfiles::prefer(const LightProfiles& other) {
+  for (const ProfileRef& profile : other.tables_) {
+    const auto at = place_of(tables_, profile->id());
+    if (at != tables_.end() && (*at)->id() == profile->id())
+      *at = profile;
+    else
+      tables_.insert(at, profile);
   }
-  slot->held = made;
-  slot->profile.store(made.get(), std::memory_order_relaxed);
-  slot->id.store(id, std::memory_order_release);
-  return made;
-}
-
-ProfileRef hold_profile(uint32_t id) {
-  Registry& r = registry();
-  ProfileRef held;
-  const std::lock_guard lock(r.mutex);
-  if (Slot* const slot = id != 0 ? slot_of(id) : nullptr) held = slot->held.lock();
-  return held;
-}
-
-float profile_share(const Vpl& v, const Vec3f& direction) {
-  const LightProfile* profile = find_profile(v.profile);
-  if (profile == nullptr) return 0.0f;
-  const Vec3f tangent = v.tangent(), bitangent = cross(tangent, v.normal);
-  const float vertical = std::acos(std::clamp(dot(direction, v.normal), -1.0f, 1.0f));
-  const float horizontal = std::atan2(dot(direction, bitangent), dot(direction, tangent));
-  return (*profile)(vertical, horizontal < 0.0f ? horizontal + static_cast<float>(2 * kPi) : horizontal);
-}
-
-const LightProfile* find_profile(uint32_t id) {
-  const Slot* const slot = id != 0 ? slot_of(id) : nullptr;
-  return slot != nullptr ? slot->profile.load(std::memory_order_acquire) : nullptr;
 }
 
 }  // namespace lumicut
