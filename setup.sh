@@ -11,7 +11,7 @@ packages=(
   openimageio-tools                                                     # their CMake files ask for the programs too
   nlohmann-json3-dev libcli11-dev libfmt-dev                            # the command's words
   libcgal-dev libgmp-dev libmpfr-dev                                    # geometry/ (a target of its own)
-  libgtest-dev libgmock-dev libbenchmark-dev python3 python3-numpy      # tests and benchmarks
+  libgtest-dev libgmock-dev libbenchmark-dev python3 python3-numpy python3-openimageio   # tests and benchmarks
   libmetis-dev libmeshoptimizer-dev libnanoflann-dev                    # rivals in the tables of bench/geometry
   binutils                                                              # a test reads the library's symbols
   chromium                                                              # a test opens the report's page

@@ -2,6 +2,7 @@
 
     blender -b --factory-startup --addons lumicut_blender -P bench/blender_collect.py
 """
+import argparse
 import os
 import pathlib
 import sys
@@ -26,8 +27,8 @@ def best(fn, count=5):
     return min(times)
 
 
-def million(objects=128, side=64, kind="smooth"):
-    """Grids of side x side quads: objects · side² · 2 triangles, each mesh its own."""
+def million(objects=128, side=64, kind="smooth", copies=499):
+    """Grids of side x side quads: objects · side² · 2 triangles, each mesh its own. A ball and its copies are instances."""
     h.new_scene()
     u = np.arange(side + 1) / side
     x, y = np.meshgrid(u, u)
@@ -52,29 +53,34 @@ def million(objects=128, side=64, kind="smooth"):
             ob.data.polygons.foreach_set("material_index", half.astype(np.int32))
             ob.data.polygons.foreach_set("use_smooth", half.astype(bool))
     ball = h.add_sphere(0.1, segments=16, name="ball")
-    for i in range(499):
+    for i in range(copies):
         copy = h.link(bpy.data.objects.new("copy", ball.data))
         copy.location = (i % 25, i // 25, 1)
     return bpy.context.evaluated_depsgraph_get()
 
 
 def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--smoke", action="store_true", help="a small scene and a small pass: to see that all of it runs")
+    options = parser.parse_args(sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else [])
+    size = {"objects": 3, "side": 4, "copies": 5} if options.smoke else {}
+    width, height = (32, 18) if options.smoke else (1920, 1080)
     for kind in ("flat", "smooth", "textured, several materials, half smooth"):
-        graph = million(kind=kind)
+        graph = million(kind=kind, **size)
         data = collect.Collector(graph).collect()
         wall, cpu = best(lambda: collect.Collector(graph).collect())
         unique = sum(len(m.indices) for m in data.meshes)
         print(f"collecting, {kind}: {unique:,} triangles in {len(data.meshes)} meshes, "
               f"{sum(len(m.transforms) for m in data.meshes)} instances: {wall:.3f} s, {cpu:.3f} CPU s", flush=True)
-    scene = h.new_scene(1920, 1080)
-    pixels = np.random.default_rng(1).random((1080, 1920, 4), np.float32)
+    scene = h.new_scene(width, height)
+    pixels = np.random.default_rng(1).random((height, width, 4), np.float32)
     found = {}
 
     class Probe(bpy.types.RenderEngine):
         bl_idname, bl_label = "LUMICUT_PROBE", "Probe"
 
         def render(self, depsgraph):
-            result = self.begin_result(0, 0, 1920, 1080)
+            result = self.begin_result(0, 0, width, height)
             target = result.layers[0].passes["Combined"]
             found["times"] = best(lambda: engine.write_pass(target, pixels))
             self.end_result(result)
@@ -84,7 +90,8 @@ def main():
     with h.quiet():
         bpy.ops.render.render()
     bpy.utils.unregister_class(Probe)
-    print(f"writing a full-HD pass of four channels: {found['times'][0]:.4f} s, {found['times'][1]:.4f} CPU s")
+    print(f"writing a pass of {width}x{height} of four channels: {found['times'][0]:.4f} s, {found['times'][1]:.4f} CPU s")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -42,7 +42,13 @@ def main():
     parser.add_argument("--width", type=int, default=320)
     parser.add_argument("--lumicut", nargs="*", default=[], metavar="INTEGRATOR,SAMPLES,NAME=VALUE,...", help="one: settings to try")
     parser.add_argument("--budgets", type=int, nargs="*", default=list(SETTINGS), help="table: CPU seconds")
+    parser.add_argument("--smoke", action="store_true", help="the smallest of everything: to see that all of it runs")
     options = parser.parse_args(sys.argv[sys.argv.index("--") + 1:])
+    settings, curve = SETTINGS, CURVE
+    if options.smoke:
+        options.width, options.parts, options.samples, options.budgets = 16, 2, 1, [1]
+        settings = {1: [("illumination_cut", 1, {"vpls": 50, "error": 0.5, "compensate": 1})]}
+        curve = {"passes": (1, 2), "samples": (1, 2)}
     small(options.width)
     options.folder.mkdir(exist_ok=True)
     if options.mode == "reference":
@@ -60,8 +66,8 @@ def main():
         return
 
     def lumicut(integrator, samples, values):
-        settings = bpy.context.scene.lumicut
-        for group in (settings.common, getattr(settings, integrator)):  # nothing stays from the row before
+        of_scene = bpy.context.scene.lumicut
+        for group in (of_scene.common, getattr(of_scene, integrator)):  # nothing stays from the row before
             for name in group.bl_rna.properties.keys():
                 group.property_unset(name)
         image, cpu, wall = measured(lambda: h.set_lumicut(integrator, samples, **values))
@@ -83,17 +89,19 @@ def main():
         loglog_plot.write(options.folder / "curve.svg", "The indirectly lit room at 320x240, against long Cycles", "CPU seconds",
                           "RMSE / mean", [
                               ("Lumicut, lightcuts in passes", [lumicut("lightcuts", 1, {"passes": n, **PASS})
-                                                                for n in CURVE["passes"]]),
-                              ("Cycles", [path_traced(n, 0.0) for n in CURVE["samples"]])])
+                                                                for n in curve["passes"]]),
+                              ("Cycles", [path_traced(n, 0.0) for n in curve["samples"]])])
         return
     _, low, _ = measured(lambda: cycles(1))
     _, high, _ = measured(lambda: cycles(17))
-    rate, fixed = (high - low) / 16, low - (high - low) / 16
+    rate = max((high - low) / 16, 1e-3)  # of tiny images both take no time at all
+    fixed = low - rate
     print(f"Cycles: {fixed:.2f} CPU s and {rate:.3f} a sample")
     for budget in options.budgets:
-        spent = max(lumicut(*row)[0] for row in SETTINGS[budget])
+        spent = max(lumicut(*row)[0] for row in settings[budget])
         for clamp in (0.0, 10.0):
             path_traced(max(1, round((spent - fixed) / rate)), clamp)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -62,4 +62,5 @@ def main():
     print(f"mean {100 * (np.mean(ours) / mean - 1):+.2f} %, largest {100 * np.abs(off).max():.2f} %, noise at most {100 * noise.max():.2f} %")
 
 
-main()
+if __name__ == "__main__":
+    main()

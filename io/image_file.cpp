@@ -6,8 +6,6 @@
 #include <ImfIO.h>
 #include <ImfOutputFile.h>
 #include <ImfStringAttribute.h>
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 #include <half.h>
 
@@ -16,6 +14,7 @@
 
 #include "io/atomic_file.h"
 #include "io/file_error.h"
+#include "io/image_module.h"
 
 namespace lumicut::io {
 
@@ -55,11 +54,7 @@ class MemoryStream : public Imf::OStream {
 
 }  // namespace
 
-const ImageLayer* Image::find(const std::string& name) const {
-  for (const auto& layer : layers)
-    if (layer.name == name) return &layer;
-  return nullptr;
-}
+Image read_image(const std::string& path) { return image_module(path).read_image(path); }
 
 void write_exr(const std::string& path, const Image& image, bool half_floats) {
   const Imath::Box2i window({image.x0, image.y0}, {image.x0 + image.width - 1, image.y0 + image.height - 1});
@@ -112,20 +107,7 @@ void write_exr(const std::string& path, const Image& image, bool half_floats) {
 
 std::string encode_png(const std::string& name, const std::vector<uint8_t>& pixels, int width, int height,
                        int components) {
-  if (pixels.size() != static_cast<size_t>(width) * static_cast<size_t>(height) * static_cast<size_t>(components) ||
-      pixels.empty())
-    throw FileError(name,
-                    fmt::format("{} values are no image of {} x {} x {}", pixels.size(), width, height, components));
-  const auto out = OIIO::ImageOutput::create("png");
-  if (!out) throw FileError(name, "OpenImageIO cannot write PNG here");
-  std::vector<unsigned char> bytes;
-  OIIO::Filesystem::IOVecOutput memory(bytes);
-  OIIO::ImageSpec spec(width, height, components, OIIO::TypeDesc::UINT8);
-  spec.attribute("oiio:ColorSpace", "sRGB");
-  out->set_ioproxy(&memory);
-  if (!out->open("memory.png", spec) || !out->write_image(OIIO::TypeDesc::UINT8, pixels.data()) || !out->close())
-    throw FileError(name, fmt::format("cannot be written: {}", out->geterror()));
-  return {bytes.begin(), bytes.end()};
+  return image_module(name).encode_png(name, pixels, width, height, components);
 }
 
 void write_png(const std::string& path, const std::vector<uint8_t>& pixels, int width, int height, int components) {

@@ -1,4 +1,5 @@
-// Images on disk, read through OpenImageIO; written as multi-layer EXR (OpenEXR) and PNG. Writing is atomic.
+// Images on disk, read through OpenImageIO (image_module.h); written as multi-layer EXR (OpenEXR) and PNG. Writing is
+// atomic.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +25,11 @@ struct Image {
   std::vector<ImageLayer> layers;
   std::map<std::string, std::string> attributes;  // strings of the header
 
-  const ImageLayer* find(const std::string& name) const;
+  const ImageLayer* find(const std::string& name) const {
+    for (const auto& layer : layers)
+      if (layer.name == name) return &layer;
+    return nullptr;
+  }
 };
 
 // Channels: radiance is R, G, B (the default layer); alpha is A; depth is Z; normal is N.X, N.Y, N.Z; other layers are

@@ -6,11 +6,11 @@
 #include <cmath>
 
 #include "io/file_error.h"
-#include "io/image_file.h"
+#include "io/image_module.h"
 #include "io/image_size.h"
 #include "io/text_lines.h"
 
-namespace lumicut::io {
+namespace lumicut::io::oiio {
 
 namespace {
 
@@ -109,4 +109,4 @@ Image read_image(const std::string& path) {
   return image;
 }
 
-}  // namespace lumicut::io
+}  // namespace lumicut::io::oiio

@@ -3,12 +3,13 @@ import json
 import os
 import pty
 import select
+import shutil
 import signal
 import subprocess
 import time
 import unittest
 
-from cli import BAD_FILE, COMMAND, FAILED, INTERRUPTED, OK, SCENE, USAGE, Cli as Base, lumicut, wait_until_busy, write_exr
+from cli import BAD_FILE, BUILD, COMMAND, FAILED, INTERRUPTED, OK, SCENE, USAGE, Cli as Base, lumicut, wait_until_busy, write_exr
 
 
 class Cli(Base):
@@ -49,6 +50,29 @@ class Info(Cli):
 
     def test_a_missing_library_is_named(self):
         self.assert_ends(lumicut("info", env={"LUMICUT_LIBRARY": "/nowhere.so"}), FAILED, "/nowhere.so")
+
+
+class Pictures(Cli):
+    """OpenImageIO and its 250 libraries are loaded for pictures alone."""
+
+    def test_the_command_links_no_openimageio(self):
+        libraries = subprocess.run(["ldd", COMMAND], capture_output=True, text=True, check=True).stdout
+        self.assertIn("libOpenEXR", libraries)
+        self.assertNotIn("libOpenImageIO", libraries)
+
+    def test_a_missing_module_is_named_where_a_picture_needs_it(self):
+        alone = self.folder / "bin/lumicut"
+        alone.parent.mkdir()
+        shutil.copy(COMMAND, alone)
+        env = {**os.environ, "LUMICUT_LIBRARY": str(BUILD / "lib/liblumicut.so")}
+        exr, png = self.folder / "a.exr", self.folder / "a.png"
+        render = [alone, "render", SCENE, "--size", "8x8", "--vpls", "20", "-q", "-o", exr]
+        for words, code in ((render, OK), ([*render, "--png", png], BAD_FILE), ([alone, "compare", exr, exr], BAD_FILE)):
+            result = subprocess.run(words, env=env, capture_output=True, text=True)
+            self.assertEqual(result.returncode, code, result.stderr)
+            if code != OK:
+                self.assertIn("the module for pictures cannot be loaded", result.stderr)
+                self.assertIn("lib/lumicut/images.so", result.stderr)
 
 
 class Usage(Cli):
