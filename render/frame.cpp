@@ -306,12 +306,6 @@ std::vector<uint32_t> light_groups(const Scene& scene) {
   return {groups.begin(), groups.end()};
 }
 
-void render_frame(const Scene& scene, const Integrator& integrator, const FrameOptions& options, Film& film,
-                  ShadeContext context, const std::function<void(const Rect&)>& tile_done) {
-  const GroupMethod all{0, &integrator};
-  render_frame(scene, {&all, 1}, options, film, context, tile_done);
-}
-
 void render_frame(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options, Film& film,
                   ShadeContext context, const std::function<void(const Rect&)>& tile_done) {
   const std::vector<Rect> tiles = frame_tiles(options);

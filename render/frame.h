@@ -39,13 +39,9 @@ struct GroupMethod {
 // Light groups that something of the scene belongs to that emits, rising.
 std::vector<uint32_t> light_groups(const Scene& scene);
 
-// Renders into `film`, whose groups are those of `methods`, or none where there is one method for all light.
+// Renders into `film` (whose crop is options.crop), whose groups are those of `methods`, or none where there is one method
+// for all light. `tile_done` is called from any thread, once a tile, after its pixels are written. Throws Error(cancelled).
 void render_frame(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options, Film& film,
-                  ShadeContext context, const std::function<void(const Rect&)>& tile_done);
-
-// The same with one method. Renders into `film` (whose crop is options.crop). `tile_done` is called from any thread,
-// once a tile, after its pixels are written. Throws Error(cancelled).
-void render_frame(const Scene& scene, const Integrator& integrator, const FrameOptions& options, Film& film,
                   ShadeContext context, const std::function<void(const Rect&)>& tile_done);
 
 }  // namespace lumicut

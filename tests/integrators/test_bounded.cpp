@@ -66,25 +66,19 @@ class WatchedAccel final : public Accel {
 
 class Cancelling : public testing::TestWithParam<const char*> {
  protected:
-  // true: it ended by Error(cancelled).
+  // true: it ended by Error(cancelled). `frame` null: prepares and no more.
   static bool cancelled(const Scene& scene, const char* id, const VplSet& vpls, const test::Settings& settings,
-                        uint32_t samples, float compensate, Progress& progress, bool shade = true) {
-    const IntegratorEntry* entry = find_integrator(id);
-    Params params(all_params(*entry));
-    for (const auto& [name, value] : settings) params.set(name, value);
+                        const test::RenderOptions* frame, Progress& progress) {
+    Preparation preparation = test::preparation_of(id, vpls, settings);
     Stats stats;
-    FrameOptions options;
-    options.width = 64, options.height = 48, options.samples = samples, options.tile_size = 64;
-    options.crop = {0, 0, options.width, options.height};
-    options.compensate = compensate;
-    Film film(options.crop);
     Arena arena(2);
     try {
-      arena.run([&] {
-        const auto integrator = entry->create();
-        integrator->prepare(scene, vpls, params, {progress, stats});
-        if (shade) render_frame(scene, *integrator, options, film, {progress, stats}, [](const Rect&) {});
-      });
+      if (frame == nullptr) {
+        arena.run([&] { preparation.prepare(scene, nullptr, preparation.params, progress, stats); });
+      } else {
+        RenderLoop loop(preparation, scene, nullptr, test::frame_of(*frame), {}, {});
+        arena.run([&] { loop.run(progress, stats, [](const Rect&) {}); });
+      }
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ErrorCode::cancelled) << error.what();
       return true;
@@ -106,14 +100,17 @@ TEST_P(Cancelling, FewRaysAreTracedAfterIt) {
   // Camera rays of one batch, the many samples that a coarse tile has; then what is shaded.
   struct Case {
     uint32_t samples;
-    float compensate;
+    bool compensate;
     uint64_t cancel_at;
   };
   for (const auto& [samples, compensate, cancel_at] :
-       {Case{256, 0.0f, 1}, Case{1, 0.0f, 5000}, Case{16, 0.0f, 200000}, Case{64, 0.1f, 1000000}}) {
+       {Case{256, false, 1}, Case{1, false, 5000}, Case{16, false, 200000}, Case{64, true, 1000000}}) {
     Progress progress;
     watch.progress = &progress, watch.cancel_at = cancel_at, watch.traced = 0, watch.after = 0;
-    const bool stopped = cancelled(*scene, GetParam(), vpls, heavy_settings(GetParam()), samples, compensate, progress);
+    test::Settings settings = heavy_settings(GetParam());
+    if (compensate) settings.insert(settings.end(), {{"compensate", "true"}, {"clamp_distance", "0.1"}});
+    const test::RenderOptions frame{.samples = samples, .tile_size = 64};
+    const bool stopped = cancelled(*scene, GetParam(), vpls, settings, &frame, progress);
     EXPECT_TRUE(stopped || watch.traced < cancel_at);
     // Two threads, each within some batches of rays. A million a second is slow: a tenth of a second.
     EXPECT_LT(watch.after, 200000u) << samples << " samples, cancelled at " << cancel_at;
@@ -142,7 +139,7 @@ TEST_P(Cancelling, EndsPreparingSoon) {
     Progress progress;
     std::atomic<bool> done{false};
     std::thread work([&] {
-      cancelled(*scene, GetParam(), vpls, {}, 1, 0.0f, progress, false);
+      cancelled(*scene, GetParam(), vpls, {}, nullptr, progress);
       done = true;
     });
     const double start = cpu_seconds();
@@ -200,7 +197,8 @@ INSTANTIATE_TEST_SUITE_P(Registry, InstancedScenes, testing::ValuesIn(ids()),
 TEST_P(InstancedScenes, EndOnEmbreeToo) {
   const auto mean = [&](const Scene& scene, const VplSet& vpls) {
     double sum = 0;
-    for (const Rgb& c : test::render(scene, GetParam(), vpls, {}, 24, 18).radiance) sum += luminance(c);
+    for (const Rgb& c : test::render(scene, GetParam(), vpls, {}, {.width = 24, .height = 18}).radiance)
+      sum += luminance(c);
     return sum;
   };
   for (uint64_t seed = 0; seed <= 14; ++seed) {

@@ -25,7 +25,7 @@ TEST_P(EveryIntegrator, GivesTheSameImageOnEmbreeAndOnOurBvh) {
   const auto truth = test::render(*embree, "exhaustive", vpls, {});
   const double theirs = test::mean_relative_error(a.radiance, truth.radiance);
   EXPECT_LT(test::mean_relative_error(b.radiance, truth.radiance), 1.25 * theirs + 0.005);
-  const auto mean = [](const test::Frame& frame) {
+  const auto mean = [](const test::Image& frame) {
     double sum = 0;
     for (const Rgb& c : frame.radiance) sum += luminance(c);
     return sum / static_cast<double>(frame.radiance.size());
@@ -36,8 +36,8 @@ TEST_P(EveryIntegrator, GivesTheSameImageOnEmbreeAndOnOurBvh) {
 TEST_P(EveryIntegrator, GivesTheSameImageOnOneAndFourThreads) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 1500);
-  const auto one = test::render(*scene, GetParam(), vpls, {}, 64, 48, 2, 1),
-             four = test::render(*scene, GetParam(), vpls, {}, 64, 48, 2, 4);
+  const auto one = test::render(*scene, GetParam(), vpls, {}, {.samples = 2, .threads = 1}),
+             four = test::render(*scene, GetParam(), vpls, {}, {.samples = 2, .threads = 4});
   EXPECT_EQ(std::memcmp(one.radiance.data(), four.radiance.data(), one.radiance.size() * sizeof(Rgb)), 0);
 }
 
@@ -57,8 +57,8 @@ TEST_P(EveryIntegrator, IsAsNearToTheSumOfSpheresAsToThatOfPoints) {
 TEST_P(EveryIntegrator, GivesTheSameImageOfSpheresOnOneAndFourThreads) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 700, 1, 1.0f);
-  const auto one = test::render(*scene, GetParam(), vpls, {}, 48, 32, 1, 1),
-             four = test::render(*scene, GetParam(), vpls, {}, 48, 32, 1, 4);
+  const auto one = test::render(*scene, GetParam(), vpls, {}, {.width = 48, .height = 32, .threads = 1}),
+             four = test::render(*scene, GetParam(), vpls, {}, {.width = 48, .height = 32, .threads = 4});
   EXPECT_EQ(std::memcmp(one.radiance.data(), four.radiance.data(), one.radiance.size() * sizeof(Rgb)), 0);
 }
 

@@ -37,7 +37,7 @@ TEST(Exhaustive, PointLampOverAFloorFollowsTheInverseSquareAndCosineLaws) {
   lamp.value = {3, 2, 1};
   const auto scene = floor_scene(lamp);
   const auto frame = test::render(*scene, "exhaustive", test::lights_of(*scene, 1),
-                                  {{"clamp_relative", "0"}, {"max_depth", "0"}}, 33, 33);
+                                  {{"clamp_relative", "0"}, {"max_depth", "0"}}, {.width = 33, .height = 33});
   for (uint32_t y = 0; y < 33; ++y)
     for (uint32_t x = 0; x < 33; ++x) {
       const double px = (x + 0.5 - 16.5) * 4.0 / 33, py = (16.5 - y - 0.5) * 4.0 / 33;
@@ -54,7 +54,7 @@ TEST(Exhaustive, SunGivesItsIrradianceOverPi) {
   sun.direction = normalize(Vec3f{1, 0, -1});
   sun.value = {4, 4, 4};
   const auto scene = floor_scene(sun);
-  const auto frame = test::render(*scene, "exhaustive", test::lights_of(*scene, 1), {}, 8, 8);
+  const auto frame = test::render(*scene, "exhaustive", test::lights_of(*scene, 1), {}, {.width = 8, .height = 8});
   for (const Rgb& c : frame.radiance) EXPECT_NEAR(c.x, 4 * std::sqrt(0.5) * 0.5 / std::numbers::pi, 1e-5);
 }
 
@@ -77,7 +77,7 @@ TEST(Exhaustive, WhiteFurnaceUnderAConstantSky) {
   scene->commit(progress);
   Progress tracing;
   const VplSet vpls = trace_vpls(*scene, {.count = 50000, .max_depth = 0}, tracing);
-  const auto frame = test::render(*scene, "exhaustive", vpls, {}, 8, 8);
+  const auto frame = test::render(*scene, "exhaustive", vpls, {}, {.width = 8, .height = 8});
   for (const Rgb& c : frame.radiance) EXPECT_NEAR(c.x, 0.5, 0.01);  // 50,000 directions: 0.5 % of spread
 }
 
@@ -95,7 +95,7 @@ TEST(Exhaustive, ClosedWhiteBoxHasTheRadianceOfItsGeometricSeries) {
   scene->set_lights({lamp});
   Progress progress;
   scene->commit(progress);
-  const VplSet vpls = test::lights_of(*scene, 5000);
+  const VplSet vpls = test::standing_lights_of(*scene, 5000);
   ShadePoints points;
   Rng rng(1, Stage::test);
   for (int i = 0; i < 2400; ++i) {
@@ -123,14 +123,14 @@ TEST(Exhaustive, ClosedWhiteBoxHasTheRadianceOfItsGeometricSeries) {
 TEST(Exhaustive, SameImageOnOneAndFourThreads) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 500);
-  const auto one = test::render(*scene, "exhaustive", vpls, {}, 64, 48, 2, 1),
-             four = test::render(*scene, "exhaustive", vpls, {}, 64, 48, 2, 4);
+  const auto one = test::render(*scene, "exhaustive", vpls, {}, {.samples = 2, .threads = 1}),
+             four = test::render(*scene, "exhaustive", vpls, {}, {.samples = 2, .threads = 4});
   EXPECT_EQ(std::memcmp(one.radiance.data(), four.radiance.data(), one.radiance.size() * sizeof(Rgb)), 0);
 }
 
 TEST(Exhaustive, NoLightsGiveBlackAndNoPointsNothing) {
   const auto scene = test::make_room();
-  const auto frame = test::render(*scene, "exhaustive", {}, {}, 16, 16);
+  const auto frame = test::render(*scene, "exhaustive", {}, {}, {.width = 16, .height = 16});
   for (const Rgb& c : frame.radiance) EXPECT_EQ(c, Rgb{});
   const auto integrator = find_integrator("exhaustive")->create();
   const VplSet vpls;
@@ -142,7 +142,7 @@ TEST(Exhaustive, NoLightsGiveBlackAndNoPointsNothing) {
 
 TEST(Exhaustive, StopsWhenCancelled) {
   const auto scene = test::make_room();
-  const VplSet vpls = test::lights_of(*scene, 100);
+  const VplSet vpls = test::standing_lights_of(*scene, 100);
   const auto integrator = find_integrator("exhaustive")->create();
   Progress progress;
   Stats stats;

@@ -28,13 +28,14 @@ TEST(IlluminationCut, EqualsExhaustiveAtNoErrorWhateverItsModes) {
 TEST(IlluminationCut, ErrorFallsWithTheParameter) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 10000);
-  const auto reference = test::render(*scene, "exhaustive", vpls, {}, 128, 96);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}, {.width = 128, .height = 96});
   for (const char* representative : {"mean", "random"}) {
     double last_error = 1;
     uint64_t last_rays = 0;
     for (const auto& [error, limit] : {std::pair{"0.1", 0.1}, {"0.02", 0.02}, {"0.004", 0.005}}) {
-      const auto frame = test::render(
-          *scene, kId, vpls, {{"error", error}, {"visibility", "full"}, {"representative", representative}}, 128, 96);
+      const auto frame = test::render(*scene, kId, vpls,
+                                      {{"error", error}, {"visibility", "full"}, {"representative", representative}},
+                                      {.width = 128, .height = 96});
       const double measured = test::mean_relative_error(frame.radiance, reference.radiance);
       // It bounds each pair; errors of many pairs have either sign.
       EXPECT_LT(measured, limit) << error;
@@ -71,9 +72,9 @@ TEST(IlluminationCut, MeanShinesAsItsLightsDoWhereTheyFaceAllWays) {
 TEST(IlluminationCut, SampledVisibilityTracesFewerRaysForLittleMoreError) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 2000);
-  const auto reference = test::render(*scene, "exhaustive", vpls, {}, 256, 192);
-  const auto full = test::render(*scene, kId, vpls, {{"visibility", "full"}}, 256, 192),
-             sampled = test::render(*scene, kId, vpls, {{"visibility", "sampling"}}, 256, 192);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}, {.width = 256, .height = 192});
+  const auto full = test::render(*scene, kId, vpls, {{"visibility", "full"}}, {.width = 256, .height = 192}),
+             sampled = test::render(*scene, kId, vpls, {{"visibility", "sampling"}}, {.width = 256, .height = 192});
   EXPECT_LT(sampled.counters.rays, full.counters.rays * 2 / 3);
   EXPECT_LT(test::mean_relative_error(sampled.radiance, reference.radiance),
             test::mean_relative_error(full.radiance, reference.radiance) + 0.005);
@@ -82,7 +83,7 @@ TEST(IlluminationCut, SampledVisibilityTracesFewerRaysForLittleMoreError) {
 TEST(IlluminationCut, UnbiasedModesAreRightOnAverage) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 2000);
-  const auto reference = test::render(*scene, "exhaustive", vpls, {}, 64, 48);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {});
   constexpr int kRuns = 24;
   const auto mean_of = [&](int runs, int first_seed) {
     std::vector<Rgb> mean(reference.radiance.size());
@@ -91,8 +92,7 @@ TEST(IlluminationCut, UnbiasedModesAreRightOnAverage) {
                                       {{"error", "0.1"},
                                        {"visibility", "unbiased"},
                                        {"representative", "stochastic"},
-                                       {"seed", std::to_string(first_seed + run)}},
-                                      64, 48);
+                                       {"seed", std::to_string(first_seed + run)}});
       for (size_t i = 0; i < mean.size(); ++i) mean[i] += frame.radiance[i] * (1.0f / static_cast<float>(runs));
     }
     return mean;
@@ -108,8 +108,9 @@ TEST(IlluminationCut, SameImageOnOneAndFourThreads) {
   const VplSet vpls = test::lights_of(*scene, 3000);
   for (const char* visibility : {"sampling", "unbiased"}) {
     const test::Settings settings = {{"visibility", visibility}};
-    const auto one = test::render(*scene, kId, vpls, settings, 96, 80, 2, 1),
-               four = test::render(*scene, kId, vpls, settings, 96, 80, 2, 4);
+    const auto one = test::render(*scene, kId, vpls, settings, {.width = 96, .height = 80, .samples = 2, .threads = 1}),
+               four =
+                   test::render(*scene, kId, vpls, settings, {.width = 96, .height = 80, .samples = 2, .threads = 4});
     EXPECT_EQ(std::memcmp(one.radiance.data(), four.radiance.data(), one.radiance.size() * sizeof(Rgb)), 0);
     EXPECT_EQ(one.counters.rays, four.counters.rays);
   }
@@ -148,26 +149,27 @@ TEST(IlluminationCut, LightsOfEveryKind) {
 
 TEST(IlluminationCut, DegenerateInputIsNoTrouble) {
   const auto scene = test::make_room();
-  const auto none = test::render(*scene, kId, VplSet{}, {}, 16, 16);
+  const auto none = test::render(*scene, kId, VplSet{}, {}, {.width = 16, .height = 16});
   for (const Rgb& c : none.radiance) EXPECT_TRUE(is_finite(c));
   VplSet one;
   one.lights.resize(1);
   one.lights[0].position = {0, -0.5f, 0.8f};
   one.lights[0].intensity = {1, 1, 1};
-  const auto single = test::render(*scene, kId, one, {}, 16, 16);
-  EXPECT_LT(test::mean_relative_error(single.radiance, test::render(*scene, "exhaustive", one, {}, 16, 16).radiance),
+  const auto single = test::render(*scene, kId, one, {}, {.width = 16, .height = 16});
+  EXPECT_LT(test::mean_relative_error(
+                single.radiance, test::render(*scene, "exhaustive", one, {}, {.width = 16, .height = 16}).radiance),
             1e-6);
   VplSet many;
   many.lights.assign(200000, one.lights[0]);
   for (Vpl& v : many.lights) v.intensity = Rgb{1, 1, 1} * (1 / 200000.0f);
-  const auto coincident = test::render(*scene, kId, many, {}, 16, 16);
+  const auto coincident = test::render(*scene, kId, many, {}, {.width = 16, .height = 16});
   // Hundreds of thousands of summands in single precision.
   EXPECT_LT(test::mean_relative_error(coincident.radiance, single.radiance), 2e-3);
 }
 
 TEST(IlluminationCut, IsCancelledAndTakesNoPoints) {
   const auto scene = test::make_room();
-  const VplSet vpls = test::lights_of(*scene, 1000);
+  const VplSet vpls = test::standing_lights_of(*scene, 1000);
   const IntegratorEntry* entry = find_integrator(kId);
   const Params params(all_params(*entry));
   Progress progress;

@@ -36,11 +36,11 @@ TEST(ColumnMethods, EqualExhaustiveWithAColumnForEachLight) {
 TEST(ColumnMethods, ErrorFallsWithTheColumns) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 6000);
-  const auto reference = test::render(*scene, "exhaustive", vpls, {}, 96, 72);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}, {.width = 96, .height = 72});
   for (const char* id : kMethods) {
     double last = 1e30;
     for (const char* columns : {"25", "200", "1600"}) {
-      const auto frame = test::render(*scene, id, vpls, {{"columns", columns}}, 96, 72);
+      const auto frame = test::render(*scene, id, vpls, {{"columns", columns}}, {.width = 96, .height = 72});
       const double error = test::rmse_over_mean(frame.radiance, reference.radiance);
       // Eight times the clusters: the cost at least halves, for all that one seed's luck may spoil.
       EXPECT_LT(error, 0.75 * last) << id << " " << columns;
@@ -56,8 +56,8 @@ TEST(ColumnMethods, SameImageOnOneAndFourThreads) {
   const VplSet vpls = test::lights_of(*scene, 20000);  // enough for sums in several chunks
   for (const char* id : kMethods) {
     const test::Settings settings = {{"columns", "100"}};
-    const auto one = test::render(*scene, id, vpls, settings, 64, 48, 2, 1),
-               four = test::render(*scene, id, vpls, settings, 64, 48, 2, 4);
+    const auto one = test::render(*scene, id, vpls, settings, {.samples = 2, .threads = 1}),
+               four = test::render(*scene, id, vpls, settings, {.samples = 2, .threads = 4});
     EXPECT_EQ(std::memcmp(one.radiance.data(), four.radiance.data(), one.radiance.size() * sizeof(Rgb)), 0) << id;
     EXPECT_EQ(one.counters.rays, four.counters.rays) << id;
   }
@@ -79,14 +79,15 @@ TEST(ColumnMethods, DegenerateLightsAreNoTrouble) {
   const auto scene = test::make_room();
   for (const char* id : kMethods) {
     const test::Settings settings = {{"columns", "8"}};
-    for (const Rgb& c : test::render(*scene, id, {}, settings, 16, 16).radiance) EXPECT_EQ(c, Rgb{}) << id;
-    const auto single = test::render(*scene, id, one_light(), settings, 16, 16);
-    const auto reference = test::render(*scene, "exhaustive", one_light(), {}, 16, 16);
+    for (const Rgb& c : test::render(*scene, id, {}, settings, {.width = 16, .height = 16}).radiance)
+      EXPECT_EQ(c, Rgb{}) << id;
+    const auto single = test::render(*scene, id, one_light(), settings, {.width = 16, .height = 16});
+    const auto reference = test::render(*scene, "exhaustive", one_light(), {}, {.width = 16, .height = 16});
     EXPECT_LT(test::mean_relative_error(single.radiance, reference.radiance), 1e-6) << id;
     VplSet many;
     many.lights.assign(200000, one_light().lights[0]);
     for (Vpl& v : many.lights) v.intensity = {5e-6f, 5e-6f, 5e-6f};
-    const auto coincident = test::render(*scene, id, many, settings, 16, 16);
+    const auto coincident = test::render(*scene, id, many, settings, {.width = 16, .height = 16});
     // All columns are the same: one light of any of them is exact, but where no row sees the light it is missing.
     size_t wrong = 0;
     for (size_t i = 0; i < single.radiance.size(); ++i)
@@ -118,7 +119,7 @@ TEST(ColumnMethods, EveryKindOfLightIsClustered) {
 
 TEST(ColumnMethods, CancelStopsThem) {
   const auto scene = test::make_room();
-  const VplSet vpls = test::lights_of(*scene, 2000);
+  const VplSet vpls = test::standing_lights_of(*scene, 2000);
   for (const char* id : kMethods) {
     const auto integrator = find_integrator(id)->create();
     const Params params(all_params(*find_integrator(id)));
@@ -185,12 +186,12 @@ TEST(LightSlice, BeatsOneClusteringForAllPointsWhereEachSeesLittle) {
 TEST(LightSlice, SeveralRepresentativesAreTakenInTurn) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 5000);
-  const auto reference = test::render(*scene, "exhaustive", vpls, {}, 64, 48, 4);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}, {.samples = 4});
   double errors[2] = {};
   for (int k = 0; k < 2; ++k)
     for (const char* seed : {"1", "2", "3"}) {
       const test::Settings settings = {{"columns", "40"}, {"seed", seed}, {"representatives", k == 0 ? "1" : "4"}};
-      errors[k] += test::rmse_over_mean(test::render(*scene, "light_slice", vpls, settings, 64, 48, 4).radiance,
+      errors[k] += test::rmse_over_mean(test::render(*scene, "light_slice", vpls, settings, {.samples = 4}).radiance,
                                         reference.radiance);
     }
   // Four draws of each cluster's light in place of one; what the rows do not tell stays. Measured: 0.80.

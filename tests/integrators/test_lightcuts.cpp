@@ -56,8 +56,8 @@ TEST(Lightcuts, LargestCutIsKept) {
 TEST(Lightcuts, SameImageOnOneAndFourThreads) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 3000);
-  const auto one = test::render(*scene, "lightcuts", vpls, {}, 64, 48, 2, 1),
-             four = test::render(*scene, "lightcuts", vpls, {}, 64, 48, 2, 4);
+  const auto one = test::render(*scene, "lightcuts", vpls, {}, {.samples = 2, .threads = 1}),
+             four = test::render(*scene, "lightcuts", vpls, {}, {.samples = 2, .threads = 4});
   EXPECT_EQ(std::memcmp(one.radiance.data(), four.radiance.data(), one.radiance.size() * sizeof(Rgb)), 0);
 }
 
@@ -80,11 +80,11 @@ TEST(Lightcuts, DegenerateLightsAreNoTrouble) {
     one.lights.resize(1);
     one.lights[0].position = {0, -0.5f, 0.8f};
     one.lights[0].intensity = {1, 1, 1};
-    const auto single = test::render(*scene, id, one, {}, 16, 16);
+    const auto single = test::render(*scene, id, one, {}, {.width = 16, .height = 16});
     VplSet many;
     many.lights.assign(20000, one.lights[0]);
     for (Vpl& v : many.lights) v.intensity = {1 / 20000.0f, 1 / 20000.0f, 1 / 20000.0f};
-    const auto coincident = test::render(*scene, id, many, {}, 16, 16);
+    const auto coincident = test::render(*scene, id, many, {}, {.width = 16, .height = 16});
     // 20,000 single-precision summands: up to 1e-4 of rounding.
     EXPECT_LT(test::mean_relative_error(coincident.radiance, single.radiance), 1e-3) << id;
     EXPECT_GT(

@@ -16,8 +16,10 @@ TEST(MultidimensionalLightcuts, EqualsExhaustiveAtNoErrorForAnyNumberOfSamples) 
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 400);
   for (uint32_t samples : {1u, 3u, 20u}) {
-    const auto reference = test::render(*scene, "exhaustive", vpls, {}, 24, 16, samples),
-               frame = test::render(*scene, kId, vpls, {{"error", "0"}}, 24, 16, samples);
+    const auto reference =
+                   test::render(*scene, "exhaustive", vpls, {}, {.width = 24, .height = 16, .samples = samples}),
+               frame =
+                   test::render(*scene, kId, vpls, {{"error", "0"}}, {.width = 24, .height = 16, .samples = samples});
     EXPECT_LT(test::mean_relative_error(frame.radiance, reference.radiance), 1e-5) << samples;  // order of summation
   }
 }
@@ -25,12 +27,12 @@ TEST(MultidimensionalLightcuts, EqualsExhaustiveAtNoErrorForAnyNumberOfSamples) 
 TEST(MultidimensionalLightcuts, ErrorFallsWithTheParameter) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 3000);
-  const auto reference = test::render(*scene, "exhaustive", vpls, {}, 48, 32, 8);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}, {.width = 48, .height = 32, .samples = 8});
   double last_error = 1;
   uint64_t last_rays = 0;
   // Texture, edges and penumbrae within a pixel are sampled as well: twice the parameter bounds the mean.
   for (const auto& [error, limit] : {std::pair{"0.05", 0.1}, {"0.01", 0.02}, {"0.002", 0.004}}) {
-    const auto frame = test::render(*scene, kId, vpls, {{"error", error}}, 48, 32, 8);
+    const auto frame = test::render(*scene, kId, vpls, {{"error", error}}, {.width = 48, .height = 32, .samples = 8});
     const double measured = test::mean_relative_error(frame.radiance, reference.radiance);
     EXPECT_LT(measured, limit) << error;
     EXPECT_LT(measured, last_error);
@@ -43,64 +45,68 @@ TEST(MultidimensionalLightcuts, ErrorFallsWithTheParameter) {
 TEST(MultidimensionalLightcuts, CostGrowsFarSlowerThanTheSamples) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 3000);
-  const auto one = test::render(*scene, kId, vpls, {}, 48, 32, 1),
-             many = test::render(*scene, kId, vpls, {}, 48, 32, 64);
+  const auto one = test::render(*scene, kId, vpls, {}, {.width = 48, .height = 32}),
+             many = test::render(*scene, kId, vpls, {}, {.width = 48, .height = 32, .samples = 64});
   EXPECT_LT(many.counters.rays, 4 * one.counters.rays) << "64 times the samples";
-  const auto lightcuts = test::render(*scene, "lightcuts", vpls, {}, 48, 32, 64);
+  const auto lightcuts = test::render(*scene, "lightcuts", vpls, {}, {.width = 48, .height = 32, .samples = 64});
   EXPECT_LT(many.counters.rays, lightcuts.counters.rays / 10);
 }
 
 TEST(MultidimensionalLightcuts, SameImageOnOneAndFourThreads) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 2000);
-  const auto one = test::render(*scene, kId, vpls, {}, 64, 48, 20, 1),
-             four = test::render(*scene, kId, vpls, {}, 64, 48, 20, 4);
+  const auto one = test::render(*scene, kId, vpls, {}, {.samples = 20, .threads = 1}),
+             four = test::render(*scene, kId, vpls, {}, {.samples = 20, .threads = 4});
   EXPECT_EQ(std::memcmp(one.radiance.data(), four.radiance.data(), one.radiance.size() * sizeof(Rgb)), 0);
 }
 
 TEST(MultidimensionalLightcuts, ImageDoesNotDependOnTheScaleOfTheScene) {
   const auto unit_scene = test::make_room();
   const VplSet vpls = test::lights_of(*unit_scene, 2000);
-  const auto unit = test::render(*unit_scene, kId, vpls, {}, 64, 48, 4).radiance;
+  const auto unit = test::render(*unit_scene, kId, vpls, {}, {.samples = 4}).radiance;
   for (float scale : {1.0f / 1024, 1024.0f}) {
     const auto scene = test::make_room(scale);
     VplSet scaled = vpls;
     for (Vpl& v : scaled.lights) v.position = v.position * scale, v.intensity = v.intensity * (scale * scale);
-    EXPECT_LT(test::rmse_over_mean(test::render(*scene, kId, scaled, {}, 64, 48, 4).radiance, unit), 1e-3) << scale;
+    EXPECT_LT(test::rmse_over_mean(test::render(*scene, kId, scaled, {}, {.samples = 4}).radiance, unit), 1e-3)
+        << scale;
   }
 }
 
 TEST(MultidimensionalLightcuts, LargestCutIsKept) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 2000);
-  const auto frame = test::render(*scene, kId, vpls, {{"error", "0"}, {"max_cut", "40"}}, 48, 32, 4);
+  const auto frame =
+      test::render(*scene, kId, vpls, {{"error", "0"}, {"max_cut", "40"}}, {.width = 48, .height = 32, .samples = 4});
   // A refinement below the limit adds the children of a light, or of a cluster of four points.
   for (float cut : frame.cut_size) EXPECT_LE(cut, 44.0f);
 }
 
 TEST(MultidimensionalLightcuts, DegenerateInputIsNoTrouble) {
   const auto scene = test::make_room();
-  const auto none = test::render(*scene, kId, VplSet{}, {}, 16, 16, 4);
+  const auto none = test::render(*scene, kId, VplSet{}, {}, {.width = 16, .height = 16, .samples = 4});
   for (const Rgb& c : none.radiance) EXPECT_TRUE(is_finite(c));
   VplSet one;
   one.lights.resize(1);
   one.lights[0].position = {0, -0.5f, 0.8f};
   one.lights[0].intensity = {1, 1, 1};
-  const auto single = test::render(*scene, kId, one, {{"error", "0"}}, 16, 16, 4);
-  EXPECT_LT(test::mean_relative_error(single.radiance, test::render(*scene, "exhaustive", one, {}, 16, 16, 4).radiance),
+  const auto single = test::render(*scene, kId, one, {{"error", "0"}}, {.width = 16, .height = 16, .samples = 4});
+  EXPECT_LT(test::mean_relative_error(
+                single.radiance,
+                test::render(*scene, "exhaustive", one, {}, {.width = 16, .height = 16, .samples = 4}).radiance),
             1e-6);
   VplSet many;
   many.lights.assign(20000, one.lights[0]);
   for (Vpl& v : many.lights) v.intensity = Rgb{1, 1, 1} * (1 / 20000.0f);
-  const auto coincident = test::render(*scene, kId, many, {}, 16, 16, 1),
-             whole = test::render(*scene, kId, one, {}, 16, 16, 1);
+  const auto coincident = test::render(*scene, kId, many, {}, {.width = 16, .height = 16}),
+             whole = test::render(*scene, kId, one, {}, {.width = 16, .height = 16});
   // 20,000 summands in single precision.
   EXPECT_LT(test::mean_relative_error(coincident.radiance, whole.radiance), 1e-3);
 }
 
 TEST(MultidimensionalLightcuts, IsCancelled) {
   const auto scene = test::make_room();
-  const VplSet vpls = test::lights_of(*scene, 500);
+  const VplSet vpls = test::standing_lights_of(*scene, 500);
   const IntegratorEntry* entry = find_integrator(kId);
   const Params params(all_params(*entry));
   Progress progress;

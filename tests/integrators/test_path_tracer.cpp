@@ -49,7 +49,9 @@ double mean_of(const std::vector<Rgb>& image) {
 
 TEST(PathTracer, RadianceInAFurnaceIsTheGeometricSum) {
   const auto scene = furnace(0.5f, 1.0f);
-  const auto image = test::render(*scene, "path_tracer", {}, {{"samples", "64"}, {"max_depth", "64"}}, 32, 24).radiance;
+  const auto image =
+      test::render(*scene, "path_tracer", {}, {{"samples", "64"}, {"max_depth", "64"}}, {.width = 32, .height = 24})
+          .radiance;
   // 49,152 paths with a spread of about the mean: .5 % is one standard deviation.
   EXPECT_NEAR(mean_of(image), 2.0, 0.03);
 }
@@ -73,7 +75,7 @@ TEST(PathTracer, DirectLightOfADiskIsTheClosedForm) {
   scene->set_camera(camera);
   Progress progress;
   scene->commit(progress);
-  const auto image = test::render(*scene, "path_tracer", {}, {{"samples", "400"}}, 8, 8).radiance;
+  const auto image = test::render(*scene, "path_tracer", {}, {{"samples", "400"}}, {.width = 8, .height = 8}).radiance;
   // Irradiance below the middle of a Lambertian disk: π L r²/(r² + h²); radiance: albedo/π of it.
   const double expected = 0.5 / kPi * (kPi * 3.0 / (1 + 4));
   EXPECT_NEAR(mean_of(image) / expected, 1.0, 0.01);  // 25,600 samples of 20 % spread: 0.13 %
@@ -108,7 +110,9 @@ TEST(PathTracer, AnEmissiveMeshGivesWhatARectangleLampGives) {
     scene->set_camera(camera);
     Progress progress;
     scene->commit(progress);
-    return test::render(*scene, "path_tracer", {}, {{"samples", std::to_string(test::trimmed(4096))}}, 32, 16).radiance;
+    return test::render(*scene, "path_tracer", {}, {{"samples", std::to_string(test::trimmed(4096))}},
+                        {.width = 32, .height = 16})
+        .radiance;
   };
   const auto a = image(true), b = image(false);
   // Rows that see the floor alone, in four parts.
@@ -147,15 +151,16 @@ std::unique_ptr<Scene> shiny_room() {
 
 TEST(Compensation, MirrorsMetalAndGlassShowWhatThePathTracerShows) {
   const auto scene = shiny_room();
-  const auto truth =
-      test::render(*scene, "path_tracer", {}, {{"samples", std::to_string(test::trimmed(48))}}, 32, 24, 64).radiance;
+  const auto truth = test::render(*scene, "path_tracer", {}, {{"samples", std::to_string(test::trimmed(48))}},
+                                  {.width = 32, .height = 24, .samples = 64})
+                         .radiance;
   constexpr int kPasses = static_cast<int>(test::trimmed(48));
-  const float clamp = 0.05f * scene->radius();
   std::vector<Rgb> mean(truth.size());
   for (int pass = 0; pass < kPasses; ++pass) {
-    const auto image =
-        test::render(*scene, "lightcuts", test::lights_of(*scene, 1000, 50 + pass), {}, 32, 24, 8, 0, clamp, 50 + pass)
-            .radiance;
+    const auto image = test::render(*scene, "lightcuts", test::lights_of(*scene, 1000, 50 + pass),
+                                    {{"compensate", "true"}, {"seed", std::to_string(50 + pass)}},
+                                    {.width = 32, .height = 24, .samples = 8})
+                           .radiance;
     for (size_t i = 0; i < mean.size(); ++i) mean[i] += image[i] / float{kPasses};
   }
   EXPECT_NEAR(mean_of(mean) / mean_of(truth), 1.0, test::trimmed_noise(0.015));
@@ -168,17 +173,20 @@ TEST(Compensation, MirrorsMetalAndGlassShowWhatThePathTracerShows) {
 // What the clamp takes away comes back: in the mean over many sets of lights the image is the path tracer's.
 TEST(Compensation, VirtualLightsMeanThePathTracersImage) {
   const auto scene = test::make_room();
-  const auto truth = test::render(*scene, "path_tracer", {},
-                                  {{"samples", std::to_string(test::trimmed(96))}, {"max_depth", "32"}}, 32, 24, 64)
-                         .radiance;
-  constexpr float kClamp = 0.35f;  // of a room of side 2: a loss nobody can miss
+  const auto truth =
+      test::render(*scene, "path_tracer", {}, {{"samples", std::to_string(test::trimmed(96))}, {"max_depth", "32"}},
+                   {.width = 32, .height = 24, .samples = 64})
+          .radiance;
   constexpr int kPasses = static_cast<int>(test::trimmed(24));
   std::vector<Rgb> mean(truth.size()), clamped(truth.size());
   for (int pass = 0; pass < kPasses; ++pass) {
     const VplSet vpls = test::lights_of(*scene, 1500, 100 + pass);
-    const test::Settings settings{{"clamp_distance", "0.35"}};
-    const auto full = test::render(*scene, "exhaustive", vpls, settings, 32, 24, 4, 0, kClamp, 100 + pass).radiance;
-    const auto cut = test::render(*scene, "exhaustive", vpls, settings, 32, 24, 4, 0, 0.0f, 100 + pass).radiance;
+    // A clamp of 0.35 in a room of side 2: a loss nobody can miss.
+    test::Settings settings{{"clamp_distance", "0.35"}, {"seed", std::to_string(100 + pass)}};
+    const test::RenderOptions options{.width = 32, .height = 24, .samples = 4};
+    const auto cut = test::render(*scene, "exhaustive", vpls, settings, options).radiance;
+    settings.emplace_back("compensate", "true");
+    const auto full = test::render(*scene, "exhaustive", vpls, settings, options).radiance;
     for (size_t i = 0; i < mean.size(); ++i) mean[i] += full[i] / float{kPasses}, clamped[i] += cut[i] / float{kPasses};
   }
   EXPECT_LT(mean_of(clamped) / mean_of(truth), 0.95);
@@ -192,22 +200,24 @@ TEST(Compensation, VirtualLightsMeanThePathTracersImage) {
 // Spheres clamp nothing, so compensation brings the gloss alone: what is reflected evenly must not come twice.
 TEST(Compensation, SpheresMeanThePathTracersImageAsTheyShrink) {
   const auto scene = test::make_room();
-  const double truth =
-      mean_of(test::render(*scene, "path_tracer", {},
-                           {{"samples", std::to_string(test::trimmed(64))}, {"max_depth", "32"}}, 32, 24, 64)
-                  .radiance);
-  constexpr float kClamp = 0.35f;
+  const double truth = mean_of(test::render(*scene, "path_tracer", {},
+                                            {{"samples", std::to_string(test::trimmed(64))}, {"max_depth", "32"}},
+                                            {.width = 32, .height = 24, .samples = 64})
+                                   .radiance);
   constexpr int kPasses = static_cast<int>(test::trimmed(12));
-  const auto mean = [&](float scale, float compensate) {
+  const auto mean = [&](float scale, bool compensate) {
     double sum = 0;
     for (uint64_t pass = 0; pass < kPasses; ++pass)
       sum += mean_of(test::render(*scene, "exhaustive", test::lights_of(*scene, 1000, 100 + pass, scale),
-                                  {{"clamp_distance", "0.35"}}, 32, 24, 2, 0, compensate, 100 + pass, scale > 0.0f)
+                                  {{"clamp_distance", "0.35"},
+                                   {"compensate", compensate ? "true" : "false"},
+                                   {"virtual_lights", scale > 0.0f ? "spheres" : "points"},
+                                   {"seed", std::to_string(100 + pass)}},
+                                  {.width = 32, .height = 24, .samples = 2})
                          .radiance);
     return sum / kPasses / truth;
   };
-  const double points = mean(0.0f, 0.0f), alone = mean(1.0f, 0.0f), full = mean(1.0f, kClamp),
-               small = mean(0.2f, kClamp);
+  const double points = mean(0.0f, false), alone = mean(1.0f, false), full = mean(1.0f, true), small = mean(0.2f, true);
   RecordProperty("of the path tracer", "points " + std::to_string(points) + ", spheres " + std::to_string(alone) +
                                            ", compensated " + std::to_string(full) + ", small ones " +
                                            std::to_string(small));

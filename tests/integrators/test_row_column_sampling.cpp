@@ -23,13 +23,13 @@ TEST(RowColumnSampling, MeanOverSeedsIsTheExhaustiveSum) {
   const auto scene = test::make_room();
   VplSet vpls = test::lights_of(*scene, 1000);
   for (Vpl& v : vpls.lights) v.intensity = Rgb{1, 1, 1} * luminance(v.intensity);
-  const auto reference = test::render(*scene, "exhaustive", vpls, {}, 32, 24);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}, {.width = 32, .height = 24});
   std::vector<Rgb> mean(reference.radiance.size());
   double single = 0;
   constexpr int kSeeds = 24;
   for (int seed = 1; seed <= kSeeds; ++seed) {
-    const auto frame =
-        test::render(*scene, "row_column_sampling", vpls, {{"columns", "60"}, {"seed", std::to_string(seed)}}, 32, 24);
+    const auto frame = test::render(*scene, "row_column_sampling", vpls,
+                                    {{"columns", "60"}, {"seed", std::to_string(seed)}}, {.width = 32, .height = 24});
     for (size_t i = 0; i < mean.size(); ++i) mean[i] += frame.radiance[i] * (1.0f / kSeeds);
     single += test::rmse_over_mean(frame.radiance, reference.radiance) / kSeeds;
   }

@@ -39,7 +39,7 @@ TEST(StochasticLightcuts, MeanOverSeedsIsTheExhaustiveSumForEveryKindOfLight) {
   // underestimated, so 5 in 1000 are allowed. A bias of 1 % moves the whole image's mean by many of its deviations.
   const auto scene = test::make_room();
   for (const VplSet& vpls : {test::lights_of(*scene, 1000), lights_of_every_kind(400)}) {
-    const auto reference = test::render(*scene, "exhaustive", vpls, {}, 24, 16);
+    const auto reference = test::render(*scene, "exhaustive", vpls, {}, {.width = 24, .height = 16});
     const size_t n = reference.radiance.size();
     constexpr int kSeeds = 200;
     std::vector<double> sum(n), sum2(n);
@@ -47,7 +47,7 @@ TEST(StochasticLightcuts, MeanOverSeedsIsTheExhaustiveSumForEveryKindOfLight) {
     for (const Rgb& c : reference.radiance) truth += luminance(c);
     for (int seed = 1; seed <= kSeeds; ++seed) {
       const auto frame = test::render(*scene, "stochastic_lightcuts", vpls,
-                                      {{"lights", "12"}, {"seed", std::to_string(seed)}}, 24, 16);
+                                      {{"lights", "12"}, {"seed", std::to_string(seed)}}, {.width = 24, .height = 16});
       double image = 0;
       for (size_t i = 0; i < n; ++i) {
         const double v = luminance(frame.radiance[i]);
@@ -88,8 +88,8 @@ TEST(StochasticLightcuts, VarianceFallsAtLeastAsFastAsTheCutGrows) {
 TEST(StochasticLightcuts, SameImageOnOneAndFourThreads) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 3000);
-  const auto one = test::render(*scene, "stochastic_lightcuts", vpls, {}, 64, 48, 2, 1),
-             four = test::render(*scene, "stochastic_lightcuts", vpls, {}, 64, 48, 2, 4);
+  const auto one = test::render(*scene, "stochastic_lightcuts", vpls, {}, {.samples = 2, .threads = 1}),
+             four = test::render(*scene, "stochastic_lightcuts", vpls, {}, {.samples = 2, .threads = 4});
   EXPECT_EQ(std::memcmp(one.radiance.data(), four.radiance.data(), one.radiance.size() * sizeof(Rgb)), 0);
 }
 
@@ -120,25 +120,26 @@ TEST(StochasticLightcuts, NeighboursDrawLightsOfTheirOwn) {
 
 TEST(StochasticLightcuts, DegenerateLightsAreNoTrouble) {
   const auto scene = test::make_room();
-  for (const Rgb& c : test::render(*scene, "stochastic_lightcuts", {}, {}, 16, 16).radiance) EXPECT_EQ(c, Rgb{});
+  for (const Rgb& c : test::render(*scene, "stochastic_lightcuts", {}, {}, {.width = 16, .height = 16}).radiance)
+    EXPECT_EQ(c, Rgb{});
   VplSet one;
   one.lights.resize(1);
   one.lights[0].position = {0, -0.5f, 0.8f};
   one.lights[0].intensity = {1, 1, 1};
-  const auto reference = test::render(*scene, "exhaustive", one, {}, 16, 16),
-             single = test::render(*scene, "stochastic_lightcuts", one, {}, 16, 16);
+  const auto reference = test::render(*scene, "exhaustive", one, {}, {.width = 16, .height = 16}),
+             single = test::render(*scene, "stochastic_lightcuts", one, {}, {.width = 16, .height = 16});
   EXPECT_LT(test::mean_relative_error(single.radiance, reference.radiance), 1e-6);
   VplSet many;
   many.lights.assign(200000, one.lights[0]);
   for (Vpl& v : many.lights) v.intensity = {5e-6f, 5e-6f, 5e-6f};
-  const auto coincident = test::render(*scene, "stochastic_lightcuts", many, {}, 16, 16);
+  const auto coincident = test::render(*scene, "stochastic_lightcuts", many, {}, {.width = 16, .height = 16});
   // Whatever is drawn gives the same; probabilities of 200,000 lights are rounded to floats.
   EXPECT_LT(test::mean_relative_error(coincident.radiance, reference.radiance), 1e-4);
 }
 
 TEST(StochasticLightcuts, CancelStopsIt) {
   const auto scene = test::make_room();
-  const VplSet vpls = test::lights_of(*scene, 2000);
+  const VplSet vpls = test::standing_lights_of(*scene, 2000);
   const auto integrator = find_integrator("stochastic_lightcuts")->create();
   const Params params(all_params(*find_integrator("stochastic_lightcuts")));
   Progress progress;

@@ -83,8 +83,8 @@ TEST(BlockKernel, EqualsThePlainSumForEveryKindAndCount) {
 TEST(Wspd, EqualsExhaustiveWithoutClusters) {
   const auto scene = test::make_room();
   const VplSet vpls = lights_of_all_kinds(*scene);
-  const auto reference = test::render(*scene, "exhaustive", vpls, {}, 64, 48, 2),
-             frame = test::render(*scene, "wspd", vpls, kExact, 64, 48, 2);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}, {.samples = 2}),
+             frame = test::render(*scene, "wspd", vpls, kExact, {.samples = 2});
   EXPECT_LT(test::mean_relative_error(frame.radiance, reference.radiance), 2e-4);  // order of summation, lobes
   EXPECT_LT(test::rmse_over_mean(frame.radiance, reference.radiance), 2e-3);
 }
@@ -156,8 +156,8 @@ TEST(Wspd, BrightClustersAreSplit) {
 TEST(Wspd, SampledVisibilityIsCloseToFullAndTracesFarFewerRays) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 10000);
-  const auto full = test::render(*scene, "wspd", vpls, {{"visibility", "full"}}, 128, 96),
-             sampled = test::render(*scene, "wspd", vpls, {{"visibility", "sampling"}}, 128, 96);
+  const auto full = test::render(*scene, "wspd", vpls, {{"visibility", "full"}}, {.width = 128, .height = 96}),
+             sampled = test::render(*scene, "wspd", vpls, {{"visibility", "sampling"}}, {.width = 128, .height = 96});
   EXPECT_LT(test::mean_relative_error(sampled.radiance, full.radiance), 0.02);
   EXPECT_LT(2 * sampled.counters.rays, full.counters.rays);
 }
@@ -165,8 +165,8 @@ TEST(Wspd, SampledVisibilityIsCloseToFullAndTracesFarFewerRays) {
 TEST(Wspd, SameImageOnOneAndFourThreads) {
   const auto scene = test::make_room();
   const VplSet vpls = lights_of_all_kinds(*scene);
-  const auto one = test::render(*scene, "wspd", vpls, {}, 64, 48, 2, 1),
-             four = test::render(*scene, "wspd", vpls, {}, 64, 48, 2, 4);
+  const auto one = test::render(*scene, "wspd", vpls, {}, {.samples = 2, .threads = 1}),
+             four = test::render(*scene, "wspd", vpls, {}, {.samples = 2, .threads = 4});
   EXPECT_TRUE(same_bits(one.radiance, four.radiance));
   EXPECT_EQ(one.counters.rays, four.counters.rays);
 }
@@ -214,20 +214,22 @@ TEST(Wspd, PreparedOnceServesEveryCameraAndComesBackFromItsState) {
 
 TEST(Wspd, DegenerateInputIsNoTrouble) {
   const auto scene = test::make_room();
-  const auto dark = test::render(*scene, "wspd", {}, {}, 16, 16);
-  const auto reference = test::render(*scene, "exhaustive", {}, {}, 16, 16);
+  const auto dark = test::render(*scene, "wspd", {}, {}, {.width = 16, .height = 16});
+  const auto reference = test::render(*scene, "exhaustive", {}, {}, {.width = 16, .height = 16});
   EXPECT_TRUE(same_bits(dark.radiance, reference.radiance));
   VplSet one;
   one.lights.resize(1);
   one.lights[0].position = {0, -0.5f, 0.8f};
   one.lights[0].intensity = {1, 1, 1};
-  const auto single = test::render(*scene, "exhaustive", one, {}, 16, 16);
-  EXPECT_LT(test::mean_relative_error(test::render(*scene, "wspd", one, kExact, 16, 16).radiance, single.radiance),
+  const auto single = test::render(*scene, "exhaustive", one, {}, {.width = 16, .height = 16});
+  EXPECT_LT(test::mean_relative_error(test::render(*scene, "wspd", one, kExact, {.width = 16, .height = 16}).radiance,
+                                      single.radiance),
             1e-5);
   VplSet many;
   many.lights.assign(1000000, one.lights[0]);
   for (Vpl& v : many.lights) v.intensity = {1e-6f, 1e-6f, 1e-6f};
-  EXPECT_LT(test::mean_relative_error(test::render(*scene, "wspd", many, kExact, 16, 16).radiance, single.radiance),
+  EXPECT_LT(test::mean_relative_error(test::render(*scene, "wspd", many, kExact, {.width = 16, .height = 16}).radiance,
+                                      single.radiance),
             1e-3);  // rounding of a million summands
   // No points at all.
   const auto wspd = find_integrator("wspd")->create();
@@ -241,7 +243,7 @@ TEST(Wspd, DegenerateInputIsNoTrouble) {
 
 TEST(Wspd, CancelStopsPreparationAndShading) {
   const auto scene = test::make_room();
-  const VplSet vpls = test::lights_of(*scene, 20000);
+  const VplSet vpls = test::standing_lights_of(*scene, 20000);
   const IntegratorEntry* entry = find_integrator("wspd");
   Params params(all_params(*entry));
   Stats stats;

@@ -1,53 +1,73 @@
-// Renders a frame below the C ABI, and measures images against each other.
+// Renders by the loop that hosts drive too, and measures images against each other.
 #pragma once
 
 #include "core/parallel.h"
 #include "lights/trace_vpls.h"
-#include "render/frame.h"
+#include "render/render_loop.h"
 #include "tests/support/test_scenes.h"
 
 namespace lumicut::test {
 
-struct Frame {
+struct Image {
   std::vector<Rgb> radiance;
   std::vector<float> cut_size;
   Counters counters;
 };
 
+struct RenderOptions {
+  uint32_t width = 64, height = 48, samples = 1, tile_size = 32;
+  int threads = 0;  // 0: all
+};
+
 using Settings = std::vector<std::pair<std::string, std::string>>;
 
+// As the library traces them, on their surfaces.
 inline VplSet lights_of(const Scene& scene, uint32_t count, uint64_t seed = 1, float sphere_scale = 0.0f) {
   Progress progress;
-  return off_surfaces(trace_vpls(scene, {.count = count, .seed = seed, .sphere_scale = sphere_scale}, progress), scene);
+  return trace_vpls(scene, {.count = count, .seed = seed, .sphere_scale = sphere_scale}, progress);
 }
 
-inline Frame render(const Scene& scene, const std::string& id, const VplSet& vpls, const Settings& settings,
-                    uint32_t width = 64, uint32_t height = 48, uint32_t samples = 1, int threads = 0,
-                    float compensate = 0.0f, uint64_t seed = 1, bool spheres = false) {
+// The same, off their surfaces: for an integrator that is prepared by hand.
+inline VplSet standing_lights_of(const Scene& scene, uint32_t count) {
+  return off_surfaces(lights_of(scene, count), scene);
+}
+
+// Of the integrator `id`, with virtual lights of the test's own.
+inline Preparation preparation_of(const std::string& id, const VplSet& vpls, const Settings& settings) {
   const IntegratorEntry* entry = find_integrator(id);
   if (entry == nullptr) fail_argument("no integrator " + id);
-  Params params(all_params(*entry));
-  for (const auto& [name, value] : settings) params.set(name, value);
+  Preparation preparation(*entry);
+  for (const auto& [name, value] : settings) preparation.params.set(name, value);
+  preparation.host_lights = std::make_shared<const VplSet>(vpls);
+  preparation.host_lights_id = 1;
+  return preparation;
+}
+
+inline FrameOptions frame_of(const RenderOptions& options) {
+  FrameOptions frame;
+  frame.width = options.width, frame.height = options.height, frame.samples = options.samples;
+  frame.tile_size = options.tile_size;
+  frame.crop = {0, 0, options.width, options.height};
+  return frame;
+}
+
+inline Image render(const Scene& scene, const std::string& id, const VplSet& vpls, const Settings& settings,
+                    const RenderOptions& options = {}) {
+  Preparation preparation = preparation_of(id, vpls, settings);
+  const FrameOptions frame = frame_of(options);
+  RenderLoop loop(preparation, scene, nullptr, frame, {}, {});
   Progress progress;
   Stats stats;
-  FrameOptions options;
-  options.width = width, options.height = height, options.samples = samples, options.tile_size = 32;
-  options.crop = {0, 0, width, height};
-  options.compensate = compensate, options.seed = seed, options.spheres = spheres;
-  Film film(options.crop);
-  Arena arena(threads);
-  arena.run([&] {
-    const auto integrator = entry->create();
-    integrator->prepare(scene, vpls, params, {progress, stats});
-    render_frame(scene, *integrator, options, film, {progress, stats}, [](const Rect&) {});
+  Arena(options.threads).run([&] { loop.run(progress, stats, [](const Rect&) {}); });
+  Image image;
+  image.radiance.resize(size_t{options.width} * options.height);
+  image.cut_size.resize(image.radiance.size());
+  loop.read([&](const Film& film) {
+    film.read(Channel::radiance, frame.crop, &image.radiance[0].x);
+    film.read(Channel::cut_size, frame.crop, image.cut_size.data());
   });
-  Frame frame;
-  frame.radiance.resize(size_t{width} * height);
-  frame.cut_size.resize(frame.radiance.size());
-  film.read(Channel::radiance, options.crop, &frame.radiance[0].x);
-  film.read(Channel::cut_size, options.crop, frame.cut_size.data());
-  frame.counters = stats.counters();
-  return frame;
+  image.counters = stats.counters();
+  return image;
 }
 
 // Mean of |luminance − reference| over max(reference, a thousandth of its mean).
