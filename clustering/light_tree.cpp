@@ -4,7 +4,6 @@
 
 #include "clustering/light_policy.h"
 #include "core/cone.h"
-#include "core/error.h"
 #include "core/rng.h"
 
 namespace lumicut {
@@ -129,13 +128,6 @@ LightNode make_node(const Cluster& c, VplKind kind) {
 }
 
 }  // namespace
-
-LightTree::Method LightTree::method_of(const std::string& name) {
-  if (name == "agglomerative") return Method::agglomerative;
-  if (name == "divisive_3d") return Method::divisive_3d;
-  if (name == "divisive_6d") return Method::divisive_6d;
-  fail_argument("no light tree \"" + name + "\"");
-}
 
 LightTree LightTree::build(const std::vector<Vpl>& lights, const Options& options, Progress& progress) {
   progress.begin("light tree", lights.size());

@@ -34,7 +34,6 @@ class LightTree {
   // Agglomerative (Eq. 2), or split in the middle of the longest axis: of positions (3D), or of positions and
   // directions scaled by a sixteenth of the scene's diagonal (6D). [Walter et al. 2008 sec. 5: the baselines]
   enum class Method { agglomerative, divisive_3d, divisive_6d };
-  static Method method_of(const std::string& name);
 
   struct Options {
     Method method = Method::agglomerative;

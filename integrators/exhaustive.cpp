@@ -12,7 +12,7 @@ class Exhaustive final : public Integrator {
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext) override {
     scene_ = &scene;
     vpls_ = &vpls;
-    const float clamp = clamp_distance(params, scene);
+    const float clamp = clamp_distance(params.common(), scene);
     falloff_ = {clamp * clamp, vpls.profiles};
   }
 
@@ -63,7 +63,7 @@ const IntegratorEntry exhaustive_integrator = {
     "Exhaustive",
     "Sums every virtual light at every point: slow, and the reference for all other methods",
     "Keller 1997; thesis Eq. 1.1",
-    [] { return std::vector<ParamInfo>{}; },
+    nullptr,
     []() -> std::unique_ptr<Integrator> { return std::make_unique<Exhaustive>(); }};
 
 }  // namespace lumicut

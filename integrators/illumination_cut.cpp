@@ -25,8 +25,6 @@ namespace {
 constexpr size_t kLeaf = PointTree::kLeaf, kGroup = PointTree::kGroup, kRegion = PointTree::kRegion;
 static_assert(kGroup == kMaxLit);
 
-enum class Visibility { full, sampling, unbiased };
-
 // Which points of a group are meant, a bit each.
 using GroupLanes = std::array<uint16_t, kLanes>;
 
@@ -67,28 +65,34 @@ struct Workspace {
   Counters total;
 };
 
+enum class Visibility { full, sampling, unbiased };
+enum class Representation { mean, random, stochastic };
+
+struct IlluminationCutParams {
+  float error = 0.02f;
+  Visibility visibility = Visibility::sampling;
+  Representation representative = Representation::mean;
+  float dark_floor = 0.01f, coarse_separation = 0.15f;
+};
+
 class IlluminationCut final : public Integrator {
  public:
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
-    const float clamp = clamp_distance(params, scene);
+    const auto& own = params.own<IlluminationCutParams>();
+    const float clamp = clamp_distance(params.common(), scene);
     falloff_ = {clamp * clamp, vpls.profiles};
-    error_ = static_cast<float>(params.real("error"));
-    floor_ = static_cast<float>(params.real("dark_floor"));
-    const std::string& visibility = params.choice("visibility");
-    visibility_ = visibility == "full"       ? Visibility::full
-                  : visibility == "sampling" ? Visibility::sampling
-                                             : Visibility::unbiased;
-    const std::string& representative = params.choice("representative");
-    stochastic_ = representative == "stochastic";
-    seed_ = static_cast<uint64_t>(params.integer("seed"));
-    const float separation = static_cast<float>(params.real("coarse_separation"));
-    separation2_ = separation * separation;
+    error_ = own.error;
+    floor_ = own.dark_floor;
+    visibility_ = own.visibility;
+    stochastic_ = own.representative == Representation::stochastic;
+    seed_ = params.common().seed;
+    separation2_ = own.coarse_separation * own.coarse_separation;
     const PhaseTimer timer(context.stats, "light tree");
     tree_ = LightTree::build(vpls.lights, {LightTree::Method::agglomerative, 2.0f * scene.radius(), 1, seed_},
                              context.progress);
     means_.clear();
-    if (representative == "mean") find_means(context.progress);
+    if (own.representative == Representation::mean) find_means(context.progress);
     context.stats.set_value("light_tree_bytes", static_cast<double>(tree_.bytes() + means_.size() * sizeof(Mean)));
   }
 
@@ -601,26 +605,31 @@ class IlluminationCut final : public Integrator {
   uint64_t seed_ = 1;
 };
 
-std::vector<ParamInfo> params() {
-  return {
-      {"error", "Error",
-       "Bounds each pair of clusters, as a share of its darkest point's radiance; it is no bound of the pixel's error",
-       "of the radiance", ParamType::real, "0.02", 0, 1},
-      {"visibility", "Visibility",
-       "full: every shadow ray; sampling: few rays a pair, more where they disagree; unbiased: as sampling, with "
-       "random "
-       "corrections",
-       "", ParamType::choice, "sampling", 0, 0, "full|sampling|unbiased"},
-      {"representative", "Representative",
-       "What stands for a cluster of lights. mean: their mean shines, one drawn for each pair casts shadows; random: "
-       "one, drawn once by luminance; stochastic: drawn anew for each 16 points and pair, noise in place of banding",
-       "", ParamType::choice, "mean", 0, 0, "mean|random|stochastic"},
-      {"dark_floor", "Dark floor", "Points darker than this are held to its error", "of the mean radiance",
-       ParamType::real, "0.01", 0, 1},
-      {"coarse_separation", "Coarse separation",
-       "Coarse image: largest cluster that is taken as one, seen from its partner; smaller is slower and surer",
-       "of the distance", ParamType::real, "0.15", 0.001, 1},
-  };
+ParamTable params() {
+  using P = IlluminationCutParams;
+  return describe(
+      number<&P::error>(
+          "error", "Error",
+          "Bounds each pair of clusters, as a share of its darkest point's radiance; it is no bound of the pixel's "
+          "error",
+          "of the radiance", 0, 1),
+      choice<&P::visibility>(
+          "visibility", "Visibility",
+          "full: every shadow ray; sampling: few rays a pair, more where they disagree; unbiased: as sampling, with "
+          "random corrections",
+          "", "full|sampling|unbiased"),
+      choice<&P::representative>(
+          "representative", "Representative",
+          "What stands for a cluster of lights. mean: their mean shines, one drawn for each pair casts shadows; "
+          "random: one, drawn once by luminance; stochastic: drawn anew for each 16 points and pair, noise in place of "
+          "banding",
+          "", "mean|random|stochastic"),
+      number<&P::dark_floor>("dark_floor", "Dark floor", "Points darker than this are held to its error",
+                             "of the mean radiance", 0, 1),
+      number<&P::coarse_separation>(
+          "coarse_separation", "Coarse separation",
+          "Coarse image: largest cluster that is taken as one, seen from its partner; smaller is slower and surer",
+          "of the distance", 0.001, 1));
 }
 
 }  // namespace

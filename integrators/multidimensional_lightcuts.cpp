@@ -71,16 +71,21 @@ struct Workspace {
   }
 };
 
+struct MultidimensionalParams {
+  float error = 0.02f;
+  uint32_t max_cut = 0;  // 0: no limit
+};
+
 class MultidimensionalLightcuts final : public Integrator {
  public:
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
-    const float clamp = clamp_distance(params, scene);
+    const auto& own = params.own<MultidimensionalParams>();
+    const float clamp = clamp_distance(params.common(), scene);
     falloff_ = {clamp * clamp, vpls.profiles};
-    error_ = static_cast<float>(params.real("error"));
-    const auto limit = params.integer("max_cut");
-    max_cut_ = limit == 0 ? std::numeric_limits<uint32_t>::max() : static_cast<uint32_t>(limit);
-    seed_ = static_cast<uint64_t>(params.integer("seed"));
+    error_ = own.error;
+    max_cut_ = own.max_cut == 0 ? std::numeric_limits<uint32_t>::max() : own.max_cut;
+    seed_ = params.common().seed;
     const PhaseTimer timer(context.stats, "light tree");
     tree_ = LightTree::build(vpls.lights, {LightTree::Method::agglomerative, 2.0f * scene.radius(), 1, seed_},
                              context.progress);
@@ -305,14 +310,14 @@ class MultidimensionalLightcuts final : public Integrator {
   uint64_t seed_ = 1;
 };
 
-std::vector<ParamInfo> params() {
-  return {
-      {"error", "Error",
-       "Bounds each pair of clusters, as a share of the pixel's radiance; it is no bound of the pixel's error",
-       "of the radiance", ParamType::real, "0.02", 0, 1},
-      {"max_cut", "Largest cut", "Most pairs a pixel may use; 0: no limit", "clusters", ParamType::integer, "0", 0,
-       1e9},
-  };
+ParamTable params() {
+  using P = MultidimensionalParams;
+  return describe(
+      number<&P::error>(
+          "error", "Error",
+          "Bounds each pair of clusters, as a share of the pixel's radiance; it is no bound of the pixel's error",
+          "of the radiance", 0, 1),
+      number<&P::max_cut>("max_cut", "Largest cut", "Most pairs a pixel may use; 0: no limit", "clusters", 0, 1e9));
 }
 
 }  // namespace

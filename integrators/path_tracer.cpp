@@ -18,15 +18,19 @@ namespace {
 constexpr size_t kChunk = 1024;       // points
 constexpr uint32_t kSureBounces = 3;  // before chance may end a path
 
+struct PathTracerParams {
+  uint32_t samples = 16;
+};
+
 class PathTracer final : public Integrator {
  public:
   void prepare(const Scene& scene, const VplSet&, const Params& params, ShadeContext context) override {
     scene_ = &scene;
     sampler_ = std::make_unique<LightSampler>(scene, &context.progress);
     lamps_ = std::make_unique<LightSurfaces>(scene);
-    samples_ = static_cast<uint32_t>(params.integer("samples"));
-    max_depth_ = static_cast<uint32_t>(params.integer("max_depth"));
-    seed_ = static_cast<uint64_t>(params.integer("seed"));
+    samples_ = params.own<PathTracerParams>().samples;
+    max_depth_ = params.common().max_depth;
+    seed_ = params.common().seed;
     std::vector<double> power;
     for (const Vpl& v : sampler_->delta_lights()) power.push_back(luminance(v.intensity));
     delta_ = DiscreteDistribution(power);
@@ -227,8 +231,8 @@ const IntegratorEntry path_tracer_integrator = {
     "Traces paths from the eye: noise in place of bias, no virtual lights and no clamp; the reference of all methods",
     "Kajiya 1986; Veach, Guibas 1995",
     [] {
-      return std::vector<ParamInfo>{
-          {"samples", "Paths", "Paths from each shaded point", "paths a point", ParamType::integer, "16", 1, 1e6}};
+      return describe(number<&PathTracerParams::samples>("samples", "Paths", "Paths from each shaded point",
+                                                         "paths a point", 1, 1e6));
     },
     []() -> std::unique_ptr<Integrator> { return std::make_unique<PathTracer>(); },
     LightSource::emitters};

@@ -1,5 +1,6 @@
 #include "integrators/traits.h"
 
+#include <map>
 #include <string_view>
 #include <utility>
 
@@ -43,17 +44,33 @@ void Integrator::load_state(const Scene&, const VplSet&, const Params&, std::spa
   throw Error(ErrorCode::unsupported, "this integrator has no state to load");
 }
 
-std::vector<ParamInfo> all_params(const IntegratorEntry& entry) {
-  std::vector<ParamInfo> table = common_params();
-  for (const ParamInfo& p : entry.params()) table.push_back(p);
-  return table;
+namespace {
+
+std::map<std::string_view, ParamTable> all_tables() {
+  std::map<std::string_view, ParamTable> tables;
+  for (const IntegratorEntry& entry : integrators()) {
+    ParamTable& table = tables[entry.id];
+    table = common_params();
+    if (entry.params == nullptr) continue;
+    ParamTable own = entry.params();
+    table.params.insert(table.params.end(), own.params.begin(), own.params.end());
+    table.own = std::move(own.own);
+  }
+  return tables;
 }
 
-std::vector<ParamInfo> effective_params(const IntegratorEntry& entry) {
-  std::vector<ParamInfo> table = all_params(entry);
-  if (entry.light_source == LightSource::emitters)
-    std::erase_if(table, [](const ParamInfo& p) { return p.of_virtual_lights; });
-  return table;
+}  // namespace
+
+const ParamTable& all_params(const IntegratorEntry& entry) {
+  static const auto& tables = *new std::map(all_tables());  // hosts keep pointers to its texts
+  return tables.at(entry.id);
+}
+
+std::vector<const Param*> effective_params(const IntegratorEntry& entry) {
+  std::vector<const Param*> shown;
+  for (const Param& p : all_params(entry).params)
+    if (!p.of_virtual_lights || entry.light_source == LightSource::virtual_lights) shown.push_back(&p);
+  return shown;
 }
 
 }  // namespace lumicut

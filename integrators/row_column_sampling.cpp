@@ -16,16 +16,22 @@ namespace {
 // A light that a row's point does not see counts a little all the same: other points may see it.
 constexpr float kShadowedShare = 0.07f;
 
+struct RowColumnParams {
+  uint32_t rows = 300, columns = 900;
+  double sampled = 0;
+};
+
 class RowColumnSampling final : public Integrator {
  public:
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
-    const float clamp = clamp_distance(params, scene);
+    const auto& own = params.own<RowColumnParams>();
+    const float clamp = clamp_distance(params.common(), scene);
     falloff_ = {clamp * clamp, vpls.profiles};
-    rows_ = static_cast<size_t>(params.integer("rows"));
-    columns_ = static_cast<size_t>(params.integer("columns"));
-    sampled_ = params.real("sampled");
-    seed_ = static_cast<uint64_t>(params.integer("seed"));
+    rows_ = own.rows;
+    columns_ = own.columns;
+    sampled_ = own.sampled;
+    seed_ = params.common().seed;
     lights_ = order_lights(vpls.lights, &context.progress);
     times_ = race_times(lights_.size(), seed_, 0, &context.progress);
   }
@@ -109,14 +115,13 @@ class RowColumnSampling final : public Integrator {
   uint64_t seed_ = 1;
 };
 
-std::vector<ParamInfo> params() {
-  return {
-      {"rows", "Rows", "Points whose light is computed in full, in 262,144 points", "points", ParamType::integer, "300",
-       1, 4096},
-      {"columns", "Columns", "Lights that render the image", "clusters", ParamType::integer, "900", 1, 1e8},
-      {"sampled", "Sampled share", "Share of the columns that is found by sampling; the others come from splitting", "",
-       ParamType::real, "0", 0, 1},
-  };
+ParamTable params() {
+  using P = RowColumnParams;
+  return describe(
+      number<&P::rows>("rows", "Rows", "Points whose light is computed in full, in 262,144 points", "points", 1, 4096),
+      number<&P::columns>("columns", "Columns", "Lights that render the image", "clusters", 1, 1e8),
+      number<&P::sampled>("sampled", "Sampled share",
+                          "Share of the columns that is found by sampling; the others come from splitting", "", 0, 1));
 }
 
 }  // namespace

@@ -34,14 +34,18 @@ struct Workspace {
   std::vector<Rgb> light;
 };
 
+struct StochasticParams {
+  uint32_t lights = 64;
+};
+
 class StochasticLightcuts final : public Integrator {
  public:
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
-    const float clamp = clamp_distance(params, scene);
+    const float clamp = clamp_distance(params.common(), scene);
     falloff_ = {clamp * clamp, vpls.profiles};
-    size_ = static_cast<size_t>(params.integer("lights"));
-    seed_ = static_cast<uint64_t>(params.integer("seed"));
+    size_ = params.own<StochasticParams>().lights;
+    seed_ = params.common().seed;
     const PhaseTimer timer(context.stats, "light tree");
     tree_ = LightTree::build(vpls.lights, {LightTree::Method::agglomerative, 2.0f * scene.radius(), 1, seed_},
                              context.progress);
@@ -245,11 +249,10 @@ class StochasticLightcuts final : public Integrator {
   uint64_t seed_ = 1;
 };
 
-std::vector<ParamInfo> params() {
-  return {
-      {"lights", "Lights", "Clusters in each point's cut, and so shadow rays: twice as many halve the variance",
-       "lights", ParamType::integer, "64", 1, 1e8},
-  };
+ParamTable params() {
+  return describe(number<&StochasticParams::lights>(
+      "lights", "Lights", "Clusters in each point's cut, and so shadow rays: twice as many halve the variance",
+      "lights", 1, 1e8));
 }
 
 }  // namespace

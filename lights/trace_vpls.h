@@ -1,6 +1,7 @@
 // Light tracing: lamps, emissive meshes and environment → VPLs. [Keller 1997; Walter et al. 2005 sec. 5]
 #pragma once
 
+#include "core/fields.h"
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "lights/vpl.h"
@@ -9,15 +10,19 @@
 namespace lumicut {
 
 struct VplOptions {
-  uint32_t count = 60000;  // wanted lights in all; what comes is within a few percent
-  float direct_share =
-      0.25f;  // of them on extended emitters, for their direct light (point, spot and sun lamps take one each)
-  uint32_t environment_count =
-      0;                    // of them for the environment, not above `count`; 0: a part of the direct ones by power
-  uint32_t max_depth = 32;  // surfaces a light path may meet
+  // Wanted lights in all; what comes is within a few percent.
+  uint32_t count = 60000;
+  // Of them on extended emitters, for their direct light (point, spot and sun lamps take one each).
+  float direct_share = 0.25f;
+  // Of them for the environment, not above `count`; 0: a part of the direct ones by power.
+  uint32_t environment_count = 0;
+  // Surfaces a light path may meet.
+  uint32_t max_depth = 32;
   uint64_t seed = 1;
-  float sphere_scale = 0.0f;  // above 0: traced lights are spheres, with radii of so many times the distance to their
-                              // tenth neighbour [lights/sphere_radii.h]
+  // Above 0: traced lights are spheres, with radii of so many times the distance to their tenth neighbour
+  // [lights/sphere_radii.h].
+  float sphere_scale = 0.0f;
+  LUMICUT_FIELDS(VplOptions, count, direct_share, environment_count, max_depth, seed, sphere_scale)
 };
 
 // Energy is normalised by the number of light paths. Deterministic. A scene without emitters gives no lights.

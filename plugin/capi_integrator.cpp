@@ -69,15 +69,15 @@ lumicut_result lumicut_get_integrator_info(uint32_t index, lumicut_integrator_in
 lumicut_result lumicut_get_param_info(const char* integrator, uint32_t index, lumicut_param_info* info) {
   return guard([&] {
     const IntegratorEntry& e = entry_named(integrator);
-    const std::vector<ParamInfo> params = effective_params(e);
+    const std::vector<const Param*> params = effective_params(e);
     if (index >= params.size())
       fail_argument("lumicut_get_param_info: index " + number_text(uint64_t{index}) + " is out of range: " + e.id +
                     " has " + number_text(uint64_t{params.size()}) + " parameters");
-    const ParamInfo& p = params[index];  // its texts are literals
+    const ParamInfo& p = *params[index];  // its texts stay
     lumicut_param_info out{};
     out.type = static_cast<uint32_t>(p.type);
     out.id = p.id, out.label = p.label, out.description = p.description, out.unit = p.unit;
-    out.choices = p.choices, out.default_text = p.default_text;
+    out.choices = p.choices, out.default_text = p.default_text.c_str();
     out.minimum = p.minimum, out.maximum = p.maximum;
     write(info, out);
   });

@@ -122,8 +122,8 @@ void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uin
   next->scene = &s.scene;
   next->scene_owner = owner_of(s);
   next->scene_version = s.scene.version();
-  next->params_key = params_text(i.params);
-  next->vpls_key = tracing_key(i.params);
+  next->params_key = i.params.all_texts();
+  next->vpls_key = tracing_key(vpl_options(i.params.common()));
   next->host_lights = h.host_lights != 0 ? i.host_lights_sets + 1 : 0;
   next->params = i.params;
   next->standing_off = off_surfaces(*vpls, s.scene);

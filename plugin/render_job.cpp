@@ -27,7 +27,7 @@ lumicut_render_t::lumicut_render_t(lumicut_integrator_t& integrator, lumicut_sce
   if (!scene.scene.has_camera()) fail_state("lumicut_scene: it has no camera");
   if (scene.device.get() != integrator.device.get())
     fail_argument("lumicut_scene: it belongs to another device than the integrator");
-  if (integrator.host_lights != nullptr && integrator.params.boolean("compensate"))
+  if (integrator.host_lights != nullptr && integrator.params.common().compensate)
     fail_argument(
         "parameter compensate: only lights that the library traced can be compensated, and the host set its own");
   if (iterations.groups && integrator.entry.light_source == LightSource::emitters)

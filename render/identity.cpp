@@ -17,7 +17,7 @@ void Identity::add_hash(std::string_view name, uint64_t hash) {
 }
 
 void Identity::add(const Params& params) {
-  for (const ParamInfo& p : params.table()) add_text(p.id, *params.text(p.id));
+  for (const Param& p : params.table()) add_text(p.id, *params.text(p.id));
 }
 
 void Identity::add(const Scene& scene, bool camera) {

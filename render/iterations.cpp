@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "core/number_text.h"
 #include "core/rng.h"
 #include "film/iteration_mean.h"
 
@@ -15,18 +14,15 @@ uint64_t film_pixel_bytes(size_t groups) {
 }
 
 Params params_of_iteration(const Params& params, uint32_t iteration, const Scene& scene) {
-  Params of = params;
-  if (iteration == 0) return of;
-  const auto seed = static_cast<uint64_t>(params.integer("seed"));
-  of.set("seed", number_text(uint64_t{hash64(seed, iteration) & 0xffffffffu}));
+  if (iteration == 0) return params;
+  CommonParams of = params.common();
+  of.seed = hash64(of.seed, iteration) & 0xffffffffu;
   const double shrink = std::pow(iteration + 1.0, -0.25);
-  if (const double scale = sphere_scale(params) * shrink; scale > 0.0)
-    of.set("sphere_scale", number_text(std::max(scale, 0.001)));
-  if (!params.boolean("compensate")) {
-    const double clamp = clamp_distance(params, scene) * shrink;
-    if (clamp > 0.0) of.set("clamp_distance", number_text(clamp));
-  }
-  return of;
+  if (const double scale = sphere_scale(of) * shrink; scale > 0.0)
+    of.sphere_scale = static_cast<float>(std::max(scale, 0.001));
+  if (!of.compensate)
+    if (const double clamp = clamp_distance(of, scene) * shrink; clamp > 0.0) of.clamp_distance = clamp;
+  return params.with(of);
 }
 
 bool enough_iterations(const IterationOptions& options, uint32_t done, double seconds, double last_seconds,

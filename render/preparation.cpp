@@ -3,49 +3,27 @@
 #include <algorithm>
 
 #include "core/error.h"
-#include "lights/trace_vpls.h"
+#include "render/identity.h"
 
 namespace lumicut {
 
-namespace {
-
-VplOptions vpl_options(const Params& params) {
-  VplOptions o;
-  o.count = static_cast<uint32_t>(params.integer("vpls"));
-  o.direct_share = static_cast<float>(params.real("direct_share"));
-  o.environment_count = static_cast<uint32_t>(params.integer("environment_vpls"));
-  o.max_depth = static_cast<uint32_t>(params.integer("max_depth"));
-  o.seed = static_cast<uint64_t>(params.integer("seed"));
-  o.sphere_scale = sphere_scale(params);
-  return o;
-}
-
-}  // namespace
-
-std::string params_text(const Params& params) {
-  std::string out;
-  for (const ParamInfo& p : params.table()) out += std::string(p.id) + "=" + *params.text(p.id) + "\n";
-  return out;
-}
-
-std::string tracing_key(const Params& params) {
-  std::string out;
-  for (const char* name :
-       {"vpls", "direct_share", "environment_vpls", "max_depth", "seed", "virtual_lights", "sphere_scale"})
-    out += std::string(name) + "=" + *params.text(name) + "\n";
-  return out;
+std::string tracing_key(const VplOptions& options) {
+  Identity key;
+  key.add_fields(options);
+  return key.text();
 }
 
 void Preparation::prepare(const Scene& scene, std::shared_ptr<const void> scene_owner, const Params& with,
                           Progress& progress, Stats& into) {
-  if (host_lights != nullptr && sphere_scale(with) > 0.0f &&
+  if (host_lights != nullptr && sphere_scale(with.common()) > 0.0f &&
       std::none_of(host_lights->lights.begin(), host_lights->lights.end(),
                    [](const Vpl& v) { return v.kind == VplKind::sphere; }))
     fail_argument(
         "parameter virtual_lights: spheres are made of lights that the library traced; the host set its own, and none "
         "is a sphere");
-  const std::string all = params_text(with);
-  const std::string tracing = tracing_key(with);
+  const std::string all = with.all_texts();
+  const VplOptions options = vpl_options(with.common());
+  const std::string tracing = tracing_key(options);
   const bool same_scene =
       prepared != nullptr && prepared->scene == &scene && prepared->scene_version == scene.version();
   const bool same_source = same_scene && prepared->host_lights == host_lights_id;
@@ -70,7 +48,7 @@ void Preparation::prepare(const Scene& scene, std::shared_ptr<const void> scene_
     next->vpls = std::make_shared<VplSet>();
   } else {
     const PhaseTimer timer(into, "light paths");
-    next->vpls = std::make_shared<VplSet>(trace_vpls(scene, vpl_options(with), progress));
+    next->vpls = std::make_shared<VplSet>(trace_vpls(scene, options, progress));
   }
   progress.check();
   into.set_value("vpls", static_cast<double>(next->vpls->lights.size()));

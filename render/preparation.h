@@ -11,9 +11,8 @@
 
 namespace lumicut {
 
-// All parameters, "name=value" a line; and those that light tracing depends on.
-std::string params_text(const Params& params);
-std::string tracing_key(const Params& params);
+// What decides whether virtual lights are traced anew, beside the scene: all fields.
+std::string tracing_key(const VplOptions& options);
 
 // Never changes once it is made: shade reads it from many threads.
 struct Prepared {

@@ -24,10 +24,10 @@ RenderLoop::State RenderLoop::state() const {
 
 FrameOptions RenderLoop::frame_options(const Prepared& prepared) const {
   FrameOptions frame = options_;
-  frame.seed = static_cast<uint64_t>(prepared.params->integer("seed"));
-  if (prepared.params->boolean("compensate") && preparation_.entry.light_source == LightSource::virtual_lights)
-    frame.compensate = clamp_distance(*prepared.params, scene_);
-  frame.spheres = sphere_scale(*prepared.params) > 0.0f;
+  frame.seed = prepared.params->common().seed;
+  if (prepared.params->common().compensate && preparation_.entry.light_source == LightSource::virtual_lights)
+    frame.compensate = clamp_distance(prepared.params->common(), scene_);
+  frame.spheres = sphere_scale(prepared.params->common()) > 0.0f;
   return frame;
 }
 
@@ -118,7 +118,7 @@ void RenderLoop::render_iterations(Progress& progress, Stats& stats,
     prepare(done);
     const Prepared& prepared = *preparation_.prepared;
     FrameOptions frame = frame_options(prepared);
-    frame.camera_samples = {static_cast<uint64_t>(preparation_.params.integer("seed")), uint64_t{done} * frame.samples};
+    frame.camera_samples = {preparation_.params.common().seed, uint64_t{done} * frame.samples};
     {
       const PhaseTimer timer(stats, "render");
       render_frame(scene_, methods(prepared, of_groups, progress, stats), frame, frame_film, {progress, stats},

@@ -183,7 +183,7 @@ void exhaustive(const BenchMesh& mesh) {
   std::vector<Vec3f> ends;
   std::vector<Packet> packets;
   auto lit = std::make_unique<LitPoints>();
-  const float clamp = clamp_distance(params, *scene);
+  const float clamp = clamp_distance(params.common(), *scene);
   for (size_t first = 0; first < points.size(); first += kMaxLit)
     for (const Vpl& v : vpls.lights) {
       light_points(v, v.intensity, clamp * clamp, points, first, std::min(kMaxLit, points.size() - first), *lit);

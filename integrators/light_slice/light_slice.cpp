@@ -51,18 +51,23 @@ class SharedTimer {
   std::array<std::atomic<uint64_t>, kPhases> nanoseconds_{};
 };
 
+struct LightSliceParams {
+  uint32_t slices = 400, columns = 400, representatives = 1;
+};
+
 class LightSlice final : public Integrator {
  public:
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
-    const float clamp = clamp_distance(params, scene);
+    const auto& own = params.own<LightSliceParams>();
+    const float clamp = clamp_distance(params.common(), scene);
     falloff_ = {clamp * clamp, vpls.profiles};
-    slices_ = static_cast<size_t>(params.integer("slices"));
-    columns_ = static_cast<size_t>(params.integer("columns"));
+    slices_ = own.slices;
+    columns_ = own.columns;
     lights_ = order_lights(vpls.lights, &context.progress);
     times_.clear();
-    for (uint32_t s = 0; s < params.integer("representatives"); ++s)
-      times_.push_back(race_times(lights_.size(), static_cast<uint64_t>(params.integer("seed")), s, &context.progress));
+    for (uint32_t s = 0; s < own.representatives; ++s)
+      times_.push_back(race_times(lights_.size(), params.common().seed, s, &context.progress));
   }
 
   size_t batch_size() const override { return kBatch; }
@@ -210,17 +215,18 @@ class LightSlice final : public Integrator {
   size_t slices_ = 0, columns_ = 0;
 };
 
-std::vector<ParamInfo> params() {
-  return {
-      {"slices", "Slices", "Groups of points that share a clustering of the lights, in 262,144 points", "slices",
-       ParamType::integer, "400", 1, 65536},
-      {"columns", "Columns", "Clusters of lights that each slice is lit by", "clusters", ParamType::integer, "400", 1,
-       1e8},
-      {"representatives", "Representatives",
-       "Choices of representative lights that the samples of a pixel take in turn: with several samples, more turn "
-       "blocks into noise",
-       "", ParamType::integer, "1", 1, 64},
-  };
+ParamTable params() {
+  using P = LightSliceParams;
+  return describe(
+      number<&P::slices>("slices", "Slices",
+                         "Groups of points that share a clustering of the lights, in 262,144 points", "slices", 1,
+                         65536),
+      number<&P::columns>("columns", "Columns", "Clusters of lights that each slice is lit by", "clusters", 1, 1e8),
+      number<&P::representatives>(
+          "representatives", "Representatives",
+          "Choices of representative lights that the samples of a pixel take in turn: with several samples, more turn "
+          "blocks into noise",
+          "", 1, 64));
 }
 
 }  // namespace

@@ -15,21 +15,26 @@ namespace {
 // Share of the `error` parameter that bounds one cluster. docs/integrators/README.md compares it with other methods.
 constexpr float kClusterShare = 0.75f;
 
+struct LightcutsParams {
+  float error = 0.02f;
+  uint32_t max_cut = 0;  // 0: no limit
+  uint32_t representatives = 1;
+  LightTree::Method tree = LightTree::Method::agglomerative;
+};
+
 class Lightcuts final : public Integrator {
  public:
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
-    const float clamp = clamp_distance(params, scene);
+    const auto& own = params.own<LightcutsParams>();
+    const float clamp = clamp_distance(params.common(), scene);
     falloff_ = {clamp * clamp, vpls.profiles};
-    error_ = kClusterShare * static_cast<float>(params.real("error"));
-    const auto limit = params.integer("max_cut");
-    max_cut_ = limit == 0 ? std::numeric_limits<uint32_t>::max() : static_cast<uint32_t>(limit);
-    seed_ = static_cast<uint64_t>(params.integer("seed"));
+    error_ = kClusterShare * own.error;
+    max_cut_ = own.max_cut == 0 ? std::numeric_limits<uint32_t>::max() : own.max_cut;
+    seed_ = params.common().seed;
     const PhaseTimer timer(context.stats, "light tree");
-    tree_ = LightTree::build(vpls.lights,
-                             {LightTree::method_of(params.choice("tree")), 2.0f * scene.radius(),
-                              static_cast<uint32_t>(params.integer("representatives")), seed_},
-                             context.progress);
+    tree_ =
+        LightTree::build(vpls.lights, {own.tree, 2.0f * scene.radius(), own.representatives, seed_}, context.progress);
     context.stats.set_value("light_tree_bytes", static_cast<double>(tree_.bytes()));
   }
 
@@ -68,22 +73,23 @@ class Lightcuts final : public Integrator {
   uint64_t seed_ = 1;
 };
 
-std::vector<ParamInfo> params() {
-  return {
-      {"error", "Error",
-       "Three quarters of it bound each cluster, as a share of the point's radiance; it is no bound of the pixel's "
-       "error",
-       "of the radiance", ParamType::real, "0.02", 0, 1},
-      {"max_cut", "Largest cut", "Most clusters a point may use; 0: no limit", "clusters", ParamType::integer, "0", 0,
-       1e9},
-      {"representatives", "Representatives",
-       "Choices of representative lights that blocks of points draw from: 1 gives the smoothest image, more turn "
-       "banding into noise",
-       "", ParamType::integer, "1", 1, 64},
-      {"tree", "Light tree",
-       "How the lights are clustered: agglomerative makes the smallest cuts, the others are baselines", "",
-       ParamType::choice, "agglomerative", 0, 0, "agglomerative|divisive_3d|divisive_6d"},
-  };
+ParamTable params() {
+  using P = LightcutsParams;
+  return describe(
+      number<&P::error>(
+          "error", "Error",
+          "Three quarters of it bound each cluster, as a share of the point's radiance; it is no bound of the pixel's "
+          "error",
+          "of the radiance", 0, 1),
+      number<&P::max_cut>("max_cut", "Largest cut", "Most clusters a point may use; 0: no limit", "clusters", 0, 1e9),
+      number<&P::representatives>(
+          "representatives", "Representatives",
+          "Choices of representative lights that blocks of points draw from: 1 gives the smoothest image, more turn "
+          "banding into noise",
+          "", 1, 64),
+      choice<&P::tree>("tree", "Light tree",
+                       "How the lights are clustered: agglomerative makes the smallest cuts, the others are baselines",
+                       "", "agglomerative|divisive_3d|divisive_6d"));
 }
 
 }  // namespace

@@ -144,6 +144,17 @@ struct Workspace {
   uint32_t rays[kMaxLit];
 };
 
+enum class Visibility { sampling, full };
+enum class LocalVisibility { representative, cubemap };
+
+struct WspdParams {
+  float separation = 0.25f, bright = 0.01f;
+  Visibility visibility = Visibility::sampling;
+  LocalVisibility local_visibility = LocalVisibility::representative;
+  float normal_threshold = 0.01f;
+  uint32_t block = 256;
+};
+
 class Wspd final : public Integrator {
  public:
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
@@ -152,8 +163,8 @@ class Wspd final : public Integrator {
       const PhaseTimer timer(context.stats, "well-separated pairs");
       WspdTree::Options options;
       options.separation = separation_;
-      options.normal_threshold = static_cast<float>(params.real("normal_threshold"));
-      options.seed = static_cast<uint64_t>(params.integer("seed"));
+      options.normal_threshold = params.own<WspdParams>().normal_threshold;
+      options.seed = params.common().seed;
       options.epsilon = scene.epsilon();
       options.accel = cubemaps_ ? &scene.accel() : nullptr;
       options.profiles = &vpls.profiles;
@@ -194,14 +205,15 @@ class Wspd final : public Integrator {
  private:
   void take(const Scene& scene, const VplSet& vpls, const Params& params) {
     scene_ = &scene;
-    const float clamp = clamp_distance(params, scene);
+    const auto& own = params.own<WspdParams>();
+    const float clamp = clamp_distance(params.common(), scene);
     falloff_ = {clamp * clamp, vpls.profiles};
-    separation_ = static_cast<float>(params.real("separation"));
+    separation_ = own.separation;
     point_separation_ = separation_ / (1.0f - separation_);
-    bright_ = static_cast<float>(params.real("bright"));
-    sampling_ = params.choice("visibility") == "sampling";
-    cubemaps_ = params.choice("local_visibility") == "cubemap";
-    largest_block_ = static_cast<size_t>(params.integer("block"));
+    bright_ = own.bright;
+    sampling_ = own.visibility == Visibility::sampling;
+    cubemaps_ = own.local_visibility == LocalVisibility::cubemap;
+    largest_block_ = own.block;
   }
 
   void tell(Stats& stats) const {
@@ -405,23 +417,25 @@ class Wspd final : public Integrator {
   size_t largest_block_ = kBlock;
 };
 
-std::vector<ParamInfo> params() {
-  return {
-      {"separation", "Separation", "Radius of a cluster over its distance: smaller is more exact", "", ParamType::real,
-       "0.25", 0.01, 0.9},
-      {"bright", "Brightest cluster", "Clusters that give more than this share of the radiance are split",
-       "of the radiance", ParamType::real, "0.01", 0, 1},
-      {"visibility", "Visibility",
-       "sampling: points of a block take over what 16 of them see, where these agree; full: each point looks itself",
-       "", ParamType::choice, "sampling", 0, 0, "sampling|full"},
-      {"local_visibility", "Visibility in clusters",
-       "cubemap: the share of a cluster's light that leaves it, by direction; representative: one of its lights stands "
-       "for all",
-       "", ParamType::choice, "representative", 0, 0, "representative|cubemap"},
-      {"normal_threshold", "Normal threshold", "Lights of a cluster whose normals differ by less count as one", "",
-       ParamType::real, "0.01", 0, 2},
-      {"block", "Largest block", "Most points that share a clustering", "points", ParamType::integer, "256", 16, 256},
-  };
+ParamTable params() {
+  using P = WspdParams;
+  return describe(
+      number<&P::separation>("separation", "Separation", "Radius of a cluster over its distance: smaller is more exact",
+                             "", 0.01, 0.9),
+      number<&P::bright>("bright", "Brightest cluster",
+                         "Clusters that give more than this share of the radiance are split", "of the radiance", 0, 1),
+      choice<&P::visibility>(
+          "visibility", "Visibility",
+          "sampling: points of a block take over what 16 of them see, where these agree; full: each point looks itself",
+          "", "sampling|full"),
+      choice<&P::local_visibility>(
+          "local_visibility", "Visibility in clusters",
+          "cubemap: the share of a cluster's light that leaves it, by direction; representative: one of its lights "
+          "stands for all",
+          "", "representative|cubemap"),
+      number<&P::normal_threshold>("normal_threshold", "Normal threshold",
+                                   "Lights of a cluster whose normals differ by less count as one", "", 0, 2),
+      number<&P::block>("block", "Largest block", "Most points that share a clustering", "points", 16, 256));
 }
 
 }  // namespace

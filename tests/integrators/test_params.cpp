@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "core/number_text.h"
 #include "integrators/integrator.h"
+#include "tests/support/params.h"
 
 namespace lumicut {
 
@@ -16,24 +18,89 @@ std::string error_of(Params& p, const char* name, const char* value) {
 }
 }  // namespace
 
-TEST(Params, DefaultsOfEveryIntegratorAreLegal) {
+// Of all members, as text.
+static std::vector<std::string> members(const Params& p) {
+  std::vector<std::string> texts;
+  for (const Param& info : p.table()) texts.push_back(info.text(p.values(), info));
+  return texts;
+}
+
+TEST(Params, EveryDefaultParsesToTheStructsDefault) {
   for (const IntegratorEntry& entry : integrators()) {
     Params p(all_params(entry));
-    for (const ParamInfo& info : p.table())
-      EXPECT_NO_THROW(p.set(info.id, info.default_text)) << entry.id << " " << info.id;
+    const auto defaults = members(p);
+    for (const ParamInfo& info : p.table()) {
+      EXPECT_EQ(*p.text(info.id), info.default_text);
+      p.set(info.id, info.default_text);
+    }
+    EXPECT_EQ(members(p), defaults) << entry.id;
+    EXPECT_EQ(p.common(), CommonParams{});
   }
 }
 
-TEST(Params, ErrorsNameParameterValueAndWhatIsAllowed) {
+TEST(Params, EachSetsItsOwnMemberAlone) {
+  for (const IntegratorEntry& entry : integrators()) {
+    const Params defaults(all_params(entry));
+    for (size_t i = 0; i < defaults.table().size(); ++i) {
+      const ParamInfo& info = defaults.table()[i];
+      Params p = defaults;
+      p.set(info.id, test::another_value(info));
+      auto expected = members(defaults), got = members(p);
+      EXPECT_NE(got[i], expected[i]) << entry.id << " " << info.id;
+      got[i] = expected[i];
+      EXPECT_EQ(got, expected) << entry.id << " " << info.id;
+    }
+  }
+}
+
+TEST(Params, ChoicesAreTheEnumeratorsInTheirOrder) {
   Params p(all_params(*find_integrator("lightcuts")));
-  EXPECT_NE(error_of(p, "errror", "1").find("\"errror\"; there are: vpls"), std::string::npos);
-  EXPECT_NE(error_of(p, "error", "2").find("error: 2 is not in [0, 1]"), std::string::npos);
-  EXPECT_NE(error_of(p, "error", "two").find("\"two\" is not a number"), std::string::npos);
-  EXPECT_NE(error_of(p, "error", "0.1x").find("not a number"), std::string::npos);
-  EXPECT_NE(error_of(p, "error", "nan").find("not a number"), std::string::npos);
-  EXPECT_NE(error_of(p, "vpls", "1.5").find("whole number"), std::string::npos);
-  EXPECT_NE(error_of(p, "tree", "oak").find("\"oak\" is not one of agglomerative|"), std::string::npos);
-  EXPECT_EQ(p.real("error"), 0.02) << "a failed set changes nothing";
+  p.set("virtual_lights", "spheres");
+  EXPECT_EQ(p.common().virtual_lights, VirtualLights::spheres);
+  p.set("compensate", "on");
+  EXPECT_TRUE(p.common().compensate);
+  EXPECT_EQ(*p.text("compensate"), "1");
+  EXPECT_EQ(*p.text("virtual_lights"), "spheres");
+}
+
+TEST(Params, ErrorsNameParameterValueAndWhatIsAllowed) {
+  for (const IntegratorEntry& entry : integrators()) {
+    Params p(all_params(entry));
+    const auto before = members(p);
+    for (const ParamInfo& info : p.table()) {
+      const auto refused = [&](const std::string& value, const std::string& why) {
+        EXPECT_EQ(error_of(p, info.id, value.c_str()), std::string("parameter ") + info.id + ": " + why);
+      };
+      if (info.type == ParamType::choice) {
+        refused("oak", std::string("\"oak\" is not one of ") + info.choices);
+        refused(info.choices, std::string("\"") + info.choices + "\" is not one of " + info.choices);
+        refused("", std::string("\"\" is not one of ") + info.choices);
+      } else if (info.type == ParamType::boolean) {
+        refused("2", "\"2\" is neither true nor false");
+      } else {
+        const std::string range = " is not in [" + number_text(info.minimum) + ", " + number_text(info.maximum) + "]";
+        for (const std::string& value : {std::string("-1"), std::string("1e+38")}) refused(value, value + range);
+        for (const char* value : {"two", "0.1x", "nan", "inf", ""})
+          refused(value, std::string("\"") + value + "\" is not a number");
+        if (info.type == ParamType::integer) refused("1.5", "1.5 is not a whole number");
+      }
+    }
+    EXPECT_EQ(members(p), before) << "a failed set changes nothing";
+    EXPECT_NE(error_of(p, "errror", "1").find("\"errror\"; there are: vpls, seed, max_depth"), std::string::npos);
+  }
+}
+
+TEST(Params, WithOtherCommonOnesTextsFollow) {
+  Params p(all_params(*find_integrator("lightcuts")));
+  p.set("error", "0.10"), p.set("direct_share", "0.50");
+  CommonParams common = p.common();
+  common.seed = 4000000000u, common.clamp_distance = 0.125;
+  const Params other = p.with(common);
+  EXPECT_EQ(*other.text("seed"), "4000000000");
+  EXPECT_EQ(*other.text("clamp_distance"), "0.125");
+  EXPECT_EQ(*other.text("error"), "0.10") << "as it was set";
+  EXPECT_EQ(*other.text("direct_share"), "0.50");
+  EXPECT_EQ(*p.text("seed"), "1");
 }
 
 TEST(Registry, IdsAreUniqueAndEveryEntryTellsWhatItIs) {

@@ -103,6 +103,7 @@ TEST(Identity, EveryFieldOfATextureCounts) {
   EXPECT_EQ(expect_every_field_counts(Texture(2, 1, 1, Texture::Format::uint8, {}, bytes)), 10u);
   EXPECT_EQ(expect_every_field_counts(Texture(2, 1, 1, Texture::Format::float32, {}, floats)), 10u);
 }
+TEST(Identity, EveryFieldOfLightTracingCounts) { EXPECT_EQ(expect_every_field_counts(VplOptions{}), 6u); }
 TEST(Identity, EveryFieldOfALightProfileCounts) {
   EXPECT_EQ(expect_every_field_counts(LightProfile({0, 1, 2}, {0}, {1, 2, 1})), 11u);
 }
