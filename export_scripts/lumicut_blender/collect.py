@@ -4,17 +4,17 @@
 Arrays are filled by foreach_get in the type that Blender stores, which is a memory copy. A mesh is converted once for
 each set of materials; its instances are transforms.
 """
-import math
-
 import bpy
 import numpy as np
 
 from . import library, lights
+from .cameras import rows
 from .materials import Materials
 from .report import Report
-from .scene_data import Mesh, SceneData, is_flat
+from .scene_data import Mesh, SceneData, flattened, is_flat
 
 AS_MESH = {"CURVE", "FONT", "META", "SURFACE"}  # a MESH item follows for each
+RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
 LEFT_OUT = {"VOLUME": "Volumes left out", "CURVES": "Hair and curve objects left out",
             "POINTCLOUD": "Point clouds left out", "GPENCIL": "Grease pencil left out",
             "GREASEPENCIL": "Grease pencil left out"}
@@ -28,11 +28,6 @@ def fetch(collection, attribute, count, width, dtype):
     out = np.empty(count * width, dtype)
     collection.foreach_get(attribute, out)
     return out.reshape(count, width) if width > 1 else out
-
-
-def rows(matrix):
-    """The upper 3x4 of a matrix, row-major."""
-    return [c for row in matrix[:3] for c in row]
 
 
 def corner_vertices(mesh, count):
@@ -196,16 +191,19 @@ class Collector:
         self.depsgraph, self.check, self.cache, self.bake = depsgraph, check, cache, bake
         self.report = report if report is not None else Report()
         self.materials = Materials(self.report, max_shininess, images, check)
+        self.materials.images.frame = depsgraph.scene_eval.frame_current
         self.scene = SceneData()
         self.profiles = lights.Profiles(self.report)
-        self._meshes = {}
+        self._meshes, self._flat = {}, []  # by what they are made from; those of flat instances
+        self._looked_at = set()
         self.instances = 0
         # Light groups by name: 0 holds all that is in none.
         names = getattr(depsgraph.view_layer_eval, "lightgroups", ())
         self.groups = {group.name: 1 + i for i, group in enumerate(names)}
 
     def collect(self):
-        override = self.depsgraph.view_layer_eval.material_override
+        layer = self.depsgraph.view_layer_eval
+        override = layer.material_override
         for count, instance in enumerate(self.depsgraph.object_instances):
             if count % 64 == 0:
                 self.check()
@@ -215,7 +213,8 @@ class Collector:
             ob = instance.object
             if ob.type == "MESH":
                 self._check_particles(instance)
-                self._add_mesh(instance, ob, override)
+                if layer.use_solid:
+                    self._add_mesh(instance, ob, override)
             elif ob.type == "LIGHT":
                 light = lights.convert_light(ob.name, ob.data, instance.matrix_world, self.materials.images, self.report,
                                              self.profiles)
@@ -227,15 +226,16 @@ class Collector:
             elif ob.type in LEFT_OUT:
                 self.report.note(ob.name, LEFT_OUT[ob.type])
         self.check()
-        self.scene.meshes = [mesh for mesh in self._meshes.values() if mesh is not None and mesh.transforms]
+        self.scene.meshes = [mesh for mesh in self._meshes.values() if mesh is not None and mesh.transforms] + self._flat
         scene = self.depsgraph.scene_eval
         bake = (lambda world: self.bake(world, scene.frame_current, self.check)) if self.bake is not None else None
-        self.scene.environment, suns = lights.convert_world(scene.world, self.materials, self.report, bake)
+        world = (getattr(layer, "world_override", None) or scene.world) if layer.use_sky else None
+        self.scene.environment, suns = lights.convert_world(world, self.materials, self.report, bake)
         for name, sun in suns:
-            sun.group = self._group(scene.world)
+            sun.group = self._group(world)
             self.scene.lights.append((name, sun))
         if self.scene.environment is not None:
-            self.scene.environment.group = self._group(scene.world)
+            self.scene.environment.group = self._group(world)
         if self.scene.environment is not None and scene.render.film_transparent:
             self.scene.environment.flags |= library.HIDDEN
         if scene.render.use_motion_blur:
@@ -274,99 +274,56 @@ class Collector:
         key = (mesh.as_pointer(), tuple(numbers), group)
         if key not in self._meshes:
             self.check()
-            self._meshes[key] = found = self._read(ob, mesh, slots, numbers)
+            found = self._read(ob, mesh, slots, numbers)
             if found is not None:
                 found.group = group
-            for flag, text in (("is_holdout", "Holdouts taken as ordinary objects"),
-                               ("is_shadow_catcher", "Shadow catchers taken as ordinary objects")):
-                if getattr(ob, flag, False):
-                    self.report.note(ob.name, text)
-            if not ob.visible_camera or not ob.visible_shadow or not ob.visible_diffuse:
-                self.report.note(ob.name, "Objects hidden from some rays, which all see here")
+                if all(self.materials.converted[n].is_hole() for n in found.numbers()):
+                    found = None
+            self._meshes[key] = found
+        if ob.as_pointer() not in self._looked_at:
+            self._looked_at.add(ob.as_pointer())
+            self._check_flags(ob)
         target = self._meshes[key]
         if target is not None:
             transform = rows(instance.matrix_world)
             if is_flat(transform):
-                self.report.note(ob.name, "Objects scaled to nothing left out")
+                target = flattened(target, transform)
+                if target is not None:
+                    self._flat.append(target)
+                    self.instances += 1
                 return
             target.transforms.append(transform)
             self.instances += 1
 
+    def _check_flags(self, ob):
+        for flag, text in (("is_holdout", "Holdouts taken as ordinary objects"),
+                           ("is_shadow_catcher", "Shadow catchers taken as ordinary objects")):
+            if getattr(ob, flag, False):
+                self.report.note(ob.name, text)
+        if not all(getattr(ob, "visible_" + ray) for ray in RAYS):
+            self.report.note(ob.name, "Objects hidden from some rays, which all see here")
+
     def _read(self, ob, mesh, slots, numbers):
         if self.cache is None:
-            return MeshReader(ob.name, mesh, numbers, self.materials, self.report, self.check).read()
+            return self._convert(ob, mesh, numbers)
         # Evaluated data move in memory; the originals' names say what they came from.
         mappings = tuple(self.materials.converted[n].mapping if self.materials.converted[n].pictures else None for n in numbers)
         names = frozenset({ob.name_full, mesh.name_full})
         key = (mesh.as_pointer(), mappings, names, tuple(numbers), len(mesh.vertices), len(mesh.loops))
         found = self.cache.meshes.get(key)
         if found is None:
-            found = MeshReader(ob.name, mesh, numbers, self.materials, self.report, self.check).read()
+            found = self._convert(ob, mesh, numbers)
             if found is None:
                 return None
             self.cache.meshes[key] = found
         return Mesh(found.name, found.positions, found.indices, found.normals, found.uvs, found.materials, found.material, [])
 
-
-def fit(render, camera_data):
-    """(horizontal, sensor width along the fitted side, aspect-corrected width and height)."""
-    width = render.resolution_x * render.pixel_aspect_x
-    height = render.resolution_y * render.pixel_aspect_y
-    mode = camera_data.sensor_fit
-    horizontal = mode == "HORIZONTAL" or (mode == "AUTO" and width >= height)
-    return horizontal, camera_data.sensor_height if mode == "VERTICAL" else camera_data.sensor_width, width, height
-
-
-def convert_camera(camera, scene, report):
-    """A library.Camera of a camera object, as the scene's resolution and pixel aspect frame it."""
-    data = camera.data
-    horizontal, sensor, width, height = fit(scene.render, data)
-    out = library.Camera()
-    m = camera.matrix_world.normalized()
-    out.to_world[:] = rows(m)
-    # What is given along the fitted side, in image heights.
-    heights = width / height if horizontal else 1.0
-    out.pixel_aspect = scene.render.pixel_aspect_x / scene.render.pixel_aspect_y
-    out.shift[:] = [data.shift_x * heights, data.shift_y * heights]
-    out.near_clip, out.far_clip = data.clip_start, data.clip_end
-    if data.type == "ORTHO":
-        out.orthographic = 1
-        out.height = data.ortho_scale / heights
-    else:
-        if data.type == "PANO":
-            report.note(camera.name, "Panoramic cameras taken as perspective ones")
-        out.fov_y = 2 * math.atan(sensor / (2 * data.lens) / heights)
-    if data.dof.use_dof:
-        distance = data.dof.focus_distance
-        if data.dof.focus_object is not None:
-            offset = data.dof.focus_object.matrix_world.translation - m.translation
-            distance = abs(offset @ m.col[2].to_3d())
-        stop = max(data.dof.aperture_fstop, 1e-5)
-        if distance > 0:
-            out.lens_radius = (1.0 if data.type == "ORTHO" else data.lens * 1e-3) / (2 * stop)
-            out.focus_distance = distance
-        if data.dof.aperture_blades > 2 or abs(data.dof.aperture_ratio - 1) > 1e-3:
-            report.note(camera.name, "Shapes of the aperture taken as a disk")
-    return out
-
-
-def viewport_camera(context, width, height):
-    """A library.Camera of a 3D view of width x height pixels."""
-    region, space = context.region_data, context.space_data
-    out = library.Camera(pixel_aspect=1.0)
-    out.to_world[:] = rows(region.view_matrix.inverted_safe().normalized())
-    projection = region.window_matrix  # the view's own: lens, zoom, offset of camera views, all in one
-    out.orthographic = 0 if region.is_perspective else 1
-    half_width, half_height = 1 / projection[0][0], 1 / projection[1][1]
-    if region.is_perspective:
-        out.fov_y = 2 * math.atan(half_height)
-        out.shift[:] = [projection[0][2] * half_width / (2 * half_height), projection[1][2] / 2]
-        out.near_clip, out.far_clip = space.clip_start, space.clip_end
-    else:
-        out.height = 2 * half_height
-        out.shift[:] = [-projection[0][3] * half_width / (2 * half_height), -projection[1][3] / 2]
-        # Orthographic views look from within: begin far behind.
-        back = np.array(region.view_matrix.inverted_safe())[:3, 2]
-        for k in range(3):
-            out.to_world[4 * k + 3] += float(back[k]) * space.clip_end * 0.5
-    return out
+    def _convert(self, ob, mesh, numbers):
+        edited = mesh.is_editmode  # its faces are with the editor, the mesh is empty
+        if edited:
+            mesh = ob.to_mesh(preserve_all_data_layers=True, depsgraph=self.depsgraph)
+        try:
+            return MeshReader(ob.name, mesh, numbers, self.materials, self.report, self.check).read()
+        finally:
+            if edited:
+                ob.to_mesh_clear()

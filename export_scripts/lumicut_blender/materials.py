@@ -11,11 +11,11 @@ import bpy
 import numpy as np
 
 from . import library
-from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Images, Mapping, Picture, Value, image_of, input_of
+from .images import Images, Picture, image_of
+from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Mapping, Value, input_of
 
 HOLE = 1e-3  # an opacity that the library takes as "not there"; 0 means 1 to it
-
-
+LARGEST_FACTOR = 1e6  # of a texture, in the library
 MIRROR = 0.1  # roughness below which the library follows a reflection instead of shading it
 
 
@@ -106,6 +106,14 @@ class Surface:
     clearcoat: ClearCoat = None
 
 
+def cut_of(factor, picture):
+    """The share of a colour, of a picture's in the mean, that lies above 1."""
+    if not (factor > 1).any() and (picture is None or picture.is_byte()):
+        return 0.0
+    colours = factor if picture is None else factor * picture.linear()
+    return float(np.maximum(colours - 1, 0).mean() / max(colours.mean(), 1e-9))
+
+
 def luminance(value):
     return value.scalar()
 
@@ -120,6 +128,8 @@ class SurfaceReader(Evaluator):
         node, output, stack = self.source(socket, stack)
         if node is None:
             return Surface()
+        if output.type != "SHADER":  # a colour where a shader should be: Cycles lets it shine
+            return Surface(emission=self.node_value(node, output, stack))
         handler = getattr(self, "closure_" + node.type.lower(), None)
         if handler is None:
             self.note(node.bl_label or node.type, "Shaders left out")
@@ -414,6 +424,10 @@ class Converted:
     pictures: dict
     mapping: Mapping
 
+    def is_hole(self):
+        """Whether no ray meets it."""
+        return self.values.opacity < 2 * HOLE and "opacity" not in self.pictures and not any(self.values.emission)
+
 
 SLOTS = ("diffuse", "specular", "emission", "opacity")
 
@@ -467,11 +481,10 @@ class Materials:
             if value.picture is not None:
                 pictures[slot] = value.picture
         for slot in ("diffuse", "specular"):
-            if (factors[slot] > 1.07).any():  # white by Burley's albedo goes without saying
+            if cut_of(factors[slot], pictures.get(slot)) > 0.07:  # white by Burley's albedo goes without saying
                 self.report.note(name, "Colours above 1 cut to 1")
-            if (factors[slot] > 1).any():
-                factors[slot] = np.minimum(factors[slot], 1)
-            getattr(m, slot)[:] = factors[slot].tolist()
+            # With a picture the library cuts the product.
+            getattr(m, slot)[:] = np.minimum(factors[slot], 1 if slot not in pictures else LARGEST_FACTOR).tolist()
         m.emission[:] = factors["emission"].tolist()
         if factors["emission"].any():
             m.flags |= library.EMIT_BOTH_SIDES
@@ -564,7 +577,8 @@ class Materials:
             self.report.note(name, "Coats that reflect more than 66 % straight on, cut to that")
         if glass <= 0 or normal_reflectance(m.ior) < most:
             m.ior = ior_of(most)
-        return Value(np.minimum(1, f0.factor / normal_reflectance(m.ior)), f0.picture)
+        factor = f0.factor / normal_reflectance(m.ior)
+        return Value(factor if f0.picture is not None else np.minimum(1, factor), f0.picture)
 
     @staticmethod
     def _mask(picture):
@@ -590,4 +604,6 @@ class Materials:
                 reader.note("", f"{socket}s left out" if socket == "Volume" else "Displacement left out")
         # Outputs inside a group cannot be: the output stands in the tree itself.
         surface = reader.surface(output.inputs["Surface"])
+        if output.inputs["Volume"].is_linked and not output.inputs["Surface"].is_linked:
+            surface = Surface(opacity=ZERO, clear=True)  # no surface: rays pass
         return surface, reader.normals, reader.heights
