@@ -42,8 +42,8 @@ struct GroupItem {
 
 // Share of the light that a surface sends back, to first order: what turns irradiance into radiance.
 float reflectance(const SurfacePoint& p) {
-  const float specular = p.ggx() ? luminance(specular_albedo(p)) * std::numbers::inv_pi_v<float>
-                                 : luminance(p.specular) * (2.0f / (p.exponent + 1.0f));
+  const float specular = p.lobe != kCosineLobe ? luminance(specular_albedo(p)) * std::numbers::inv_pi_v<float>
+                                               : luminance(p.specular) * (2.0f / (p.shape + 1.0f));
   return luminance(p.diffuse) + specular;
 }
 
