@@ -8,8 +8,6 @@ namespace {
 
 constexpr float kInvPi = std::numbers::inv_pi_v<float>;
 
-bool smooth_coat(const BsdfParameters& m) { return m.coat > 0.0f && m.coat_alpha < kLeastAlpha; }
-
 // Sets the view's mirror image; returns the view's cosine. Bent shading normals may turn from the viewer: seen edge-on
 // then.
 float set_mirror(const Vec3f& to_viewer, SurfacePoint& p) {
@@ -42,27 +40,27 @@ Bsdf::Bsdf(const BsdfParameters& parameters, const SurfaceView& view)
     p.mirror = normalize(reflect(to_viewer_, p.normal));
     p.diffuse = parameters.diffuse * kInvPi;
     p.specular = parameters.specular * cosine_lobe_scale(parameters.model == LobeModel::phong, parameters.exponent);
-    p.exponent = parameters.exponent;
+    p.shape = parameters.exponent;
     diffuse_color_ = parameters.diffuse, specular_color_ = parameters.specular;
     return;
   }
   colors_ = ggx_colors(parameters);
   diffuse_color_ = parameters.diffuse * ((1.0f - parameters.metallic) * (1.0f - parameters.transmission));
   specular_color_ = colors_.specular;
-  specular_ = smooth_coat(parameters) || colors_.is_specular();
+  specular_ = smooth_coat(parameters.coat, parameters.coat_alpha) || colors_.is_specular();
   const float cosine = set_mirror(to_viewer_, p);
   const GgxDiffuse diffuse = ggx_diffuse(colors_, cosine);
   p.diffuse = diffuse.scale * kInvPi;
   p.falloff = diffuse.falloff;
-  p.alpha = std::max(kLeastAlpha, colors_.alpha);
+  p.lobe = kLobe<GgxReflection>, p.shape = std::max(kLeastAlpha, colors_.alpha);
   if (colors_.alpha >= kLeastAlpha) p.specular = colors_.specular, p.grazing = colors_.grazing;
   if (!(parameters.coat > 0.0f)) return;
   const ClearCoat coat = clear_coat(parameters);
   dim_by_coat(coat, cosine, p);
-  if (smooth_coat(parameters)) return;
+  if (smooth_coat(parameters.coat, parameters.coat_alpha)) return;
   SurfacePoint& above = layers_[layer_count_++];
   above.position = p.position, above.normal = p.normal, above.mirror = p.mirror, above.pixel = p.pixel;
-  above.alpha = coat.alpha;
+  above.lobe = kLobe<GgxReflection>, above.shape = coat.alpha;
   above.specular = Rgb{1, 1, 1} * coat.f0, above.grazing = Rgb{1, 1, 1} * coat.f90;
 }
 
@@ -131,7 +129,8 @@ std::optional<BsdfSample> Bsdf::sample_specular(float choice, float u, float v) 
     const ClearCoat coat = clear_coat(parameters_);
     const float shown = coat.transmittance.at(view.z);
     reflected *= shown, passed *= shown;
-    if (smooth_coat(parameters_)) of_coat = coat_reflectance(coat, dot(view, half_vector(coat.alpha)));
+    if (smooth_coat(parameters_.coat, parameters_.coat_alpha))
+      of_coat = coat_reflectance(coat, dot(view, half_vector(coat.alpha)));
   }
   const float most_reflected = max_component(reflected), most_passed = max_component(passed);
   const float sum = most_reflected + most_passed + of_coat;
@@ -196,7 +195,7 @@ std::optional<ScatterSample> Bsdf::scatter_cosine(Rng& rng) const {
     s.weight = kd, s.factor = 1.0f / p_diffuse;
   } else {
     const float n = parameters_.exponent;
-    s.direction = sample_cosine_lobe(layers_[0].mirror, n, u, v);
+    s.direction = CosineLobe::sample(layers_[0], u, v);
     // lobe·cosθ / pdf, with pdf = (n+1)/2π cosⁿβ
     const float scale =
         cosine_lobe_scale(parameters_.model == LobeModel::phong, n) * 2.0f * std::numbers::pi_v<float> / (n + 1.0f);

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/vec.h"
+#include "bsdf/shade_points.h"
 
 namespace lumicut {
 
@@ -18,17 +18,32 @@ inline float cosine_lobe_scale(bool phong, float exponent) {
   return phong ? kInvTwoPi : (exponent + 2.0f) * kInvTwoPi;
 }
 
-// A direction about `mirror` with the density (n+1)/(2π) cosⁿβ; and that density times `share`.
-inline Vec3f sample_cosine_lobe(const Vec3f& mirror, float exponent, float u, float v) {
-  const float phi = 2.0f * std::numbers::pi_v<float> * v;
-  const float c = std::pow(u, 1.0f / (exponent + 1.0f)), r = std::sqrt(std::max(0.0f, 1.0f - c * c));
-  return Frame(mirror).to_world({r * std::cos(phi), r * std::sin(phi), c});
-}
-inline float cosine_lobe_pdf(float share, float exponent, float beta) {
-  return beta > 0.0f ? share * (exponent + 1.0f) * 0.5f * std::numbers::inv_pi_v<float> *
-                           std::pow(std::min(1.0f, beta), exponent)
-                     : 0.0f;
-}
+// The lobe of a SurfacePoint: shape is n, specular ks times that factor. [requirements: bsdf/lobes.h]
+struct CosineLobe {
+  static Rgb value(const SurfacePoint& p, const Vec3f& to_light) {
+    const float beta = dot(p.mirror, to_light);
+    return beta > 0.0f ? p.specular * std::pow(std::min(1.0f, beta), p.shape) : Rgb{};
+  }
+  // Density (n+1)/(2π) cosⁿβ.
+  static Vec3f sample(const SurfacePoint& p, float u, float v) {
+    const float phi = 2.0f * std::numbers::pi_v<float> * v;
+    const float c = std::pow(u, 1.0f / (p.shape + 1.0f)), r = std::sqrt(std::max(0.0f, 1.0f - c * c));
+    return Frame(p.mirror).to_world({r * std::cos(phi), r * std::sin(phi), c});
+  }
+  static float pdf(float share, const SurfacePoint& p, const Vec3f& direction) {
+    const float beta = dot(p.mirror, direction);
+    return beta > 0.0f ? share * (p.shape + 1.0f) * 0.5f * std::numbers::inv_pi_v<float> *
+                             std::pow(std::min(1.0f, beta), p.shape)
+                       : 0.0f;
+  }
+  static Rgb albedo(const SurfacePoint& p) {
+    return p.specular * (2.0f * std::numbers::pi_v<float> / (p.shape + 1.0f));
+  }
+  static float importance(const SurfacePoint& p, float /*cosine*/, float beta) {
+    const float specular = luminance(p.specular);
+    return specular > 0.0f && beta > 0.0f ? specular * std::pow(beta, p.shape) : 0.0f;
+  }
+};
 
 }  // namespace lumicut
 
@@ -50,21 +65,25 @@ HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// cosine^exponent, 0 from the horizon on.
-HWY_INLINE V CosineLobe(D d, V cosine, V exponent) {
-  const V base = hn::Min(hn::Max(cosine, hn::Set(d, 1e-20f)), hn::Set(d, 1.0f));
-  const V lobe = hn::Exp(d, hn::Max(hn::Mul(exponent, hn::Log(d, base)), hn::Set(d, -80.0f)));
-  return hn::IfThenElseZero(hn::Gt(cosine, hn::Zero(d)), lobe);
-}
+// SIMD counterpart of lumicut::CosineLobe.
+struct CosineLobe {
+  static constexpr bool kFresnel = false, kBoundOverCosine = false, kAroundMirror = true;
 
-// Its largest value over cosines of at most `beta` to the mirror direction.
-HWY_INLINE V BoundOfCosineLobe(D d, V beta, V exponent) {
-  // Rounding of the cosine is magnified by the exponent: a part in 10^6 of slack before it.
-  beta = hn::Min(hn::Set(d, 1.0f), hn::MulAdd(beta, hn::Set(d, 1.000001f), hn::Set(d, 1e-6f)));
-  const V base = hn::Max(beta, hn::Set(d, 1e-20f));
-  const V lobe = hn::Exp(d, hn::Max(hn::Mul(exponent, hn::Log(d, base)), hn::Set(d, -80.0f)));
-  return hn::IfThenElseZero(hn::Gt(beta, hn::Zero(d)), lobe);
-}
+  // cosⁿβ, 0 from 90 degrees on.
+  static HWY_INLINE LobeValue Value(D d, V exponent, const LobeDirections& at) {
+    const V base = hn::Min(hn::Max(at.beta, hn::Set(d, 1e-20f)), hn::Set(d, 1.0f));
+    const V lobe = hn::Exp(d, hn::Max(hn::Mul(exponent, hn::Log(d, base)), hn::Set(d, -80.0f)));
+    return {hn::IfThenElseZero(hn::Gt(at.beta, hn::Zero(d)), lobe), hn::Zero(d)};
+  }
+  static HWY_INLINE LobeValue Bound(D d, const LobeCone& cone) {
+    // Rounding of the cosine is magnified by the exponent: a part in 10^6 of slack before it.
+    const V beta = hn::Min(hn::Set(d, 1.0f), hn::MulAdd(cone.beta, hn::Set(d, 1.000001f), hn::Set(d, 1e-6f)));
+    const V base = hn::Max(beta, hn::Set(d, 1e-20f));
+    const V lobe = hn::Exp(d, hn::Max(hn::Mul(cone.low, hn::Log(d, base)), hn::Set(d, -80.0f)));
+    return {hn::IfThenElseZero(hn::Gt(beta, hn::Zero(d)), lobe), hn::Zero(d)};
+  }
+  static HWY_INLINE V Width(D d, V exponent) { return hn::Div(hn::Set(d, 2.0f), hn::Add(hn::Set(d, 1.0f), exponent)); }
+};
 
 }  // namespace lumicut::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

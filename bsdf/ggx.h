@@ -13,6 +13,9 @@ namespace lumicut {
 // α = roughness². Sharper lobes are specular: rays follow them, for point lights cannot shade them.
 inline constexpr float kLeastAlpha = 0.01f;
 
+// Whether a clear coat is specular. `coat`: its share of the surface.
+inline bool smooth_coat(float coat, float alpha) { return coat > 0.0f && alpha < kLeastAlpha; }
+
 // √(c²(1 − α²) + α²): cosine times √(1 + tan²·α²), of Smith's masking.
 inline float ggx_root(float alpha2, float cosine) { return std::sqrt(cosine * cosine * (1.0f - alpha2) + alpha2); }
 

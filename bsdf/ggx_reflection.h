@@ -4,6 +4,7 @@
 #define LUMICUT_BSDF_GGX_REFLECTION_H_
 
 #include "bsdf/ggx.h"
+#include "bsdf/shade_points.h"
 
 namespace lumicut {
 
@@ -38,29 +39,37 @@ inline GgxTerms ggx_terms(float alpha, const Vec3f& normal, const Vec3f& mirror,
   return t;
 }
 
-// Largest D·V·(n·l)/cosine over lights of at most `cosine` to the normal and `beta` to the mirror direction: the half
-// vector is turned from the normal by at least half as much as the light from the mirror direction.
-inline float ggx_lobe_bound(float alpha, float nv, float cosine, float beta) {
-  const float a2 = alpha * alpha, far = 0.5f * (1.0f - std::min(1.0f, beta));  // sin² of the half vector's turn
-  const float e = a2 * (1.0f - far) + far;
-  nv = std::max(1e-4f, nv);
-  return a2 * std::numbers::inv_pi_v<float> / (e * e) * 0.5f / (cosine * ggx_root(a2, nv) + nv * ggx_root(a2, cosine));
-}
-
-// The lobe's density of directions, by visible half vectors, times `share`; `mirror`: the view's mirror image.
-// [Heitz 2018]
-inline float ggx_reflection_pdf(float share, float alpha, const Vec3f& normal, const Vec3f& mirror,
-                                const Vec3f& direction) {
-  const float nv = std::max(1e-4f, dot(normal, mirror));
-  const float d = ggx_terms(alpha, normal, mirror, direction).distribution;
-  return share * d * 0.5f / (nv + ggx_root(alpha * alpha, nv));
-}
-inline Vec3f sample_ggx_reflection(float alpha, const Vec3f& normal, const Vec3f& mirror, float u, float v) {
-  const Frame frame(normal);
-  const Vec3f view = frame.to_local(reflect(mirror, normal));
-  const Vec3f h = sample_visible_normal({view.x, view.y, std::max(1e-4f, view.z)}, alpha, u, v);
-  return frame.to_world(normalize(reflect(view, h)));
-}
+// The lobe of a SurfacePoint: shape is α, specular F0, grazing F90. [requirements: bsdf/lobes.h]
+struct GgxReflection {
+  static Rgb value(const SurfacePoint& p, const Vec3f& to_light) {
+    const GgxTerms t = ggx_terms(p.shape, p.normal, p.mirror, to_light);
+    return (p.specular * (1.0f - t.fresnel) + p.grazing * t.fresnel) * (t.distribution * t.visibility);
+  }
+  // By visible half vectors. [Heitz 2018]
+  static Vec3f sample(const SurfacePoint& p, float u, float v) {
+    const Frame frame(p.normal);
+    const Vec3f view = frame.to_local(reflect(p.mirror, p.normal));
+    const Vec3f h = sample_visible_normal({view.x, view.y, std::max(1e-4f, view.z)}, p.shape, u, v);
+    return frame.to_world(normalize(reflect(view, h)));
+  }
+  static float pdf(float share, const SurfacePoint& p, const Vec3f& direction) {
+    const float nv = std::max(1e-4f, dot(p.normal, p.mirror));
+    const float d = ggx_terms(p.shape, p.normal, p.mirror, direction).distribution;
+    return share * d * 0.5f / (nv + ggx_root(p.shape * p.shape, nv));
+  }
+  static Rgb albedo(const SurfacePoint& p) {
+    return p.specular + max(p.grazing - p.specular, Rgb{}) * schlick_share(dot(p.normal, p.mirror));
+  }
+  // The largest D·V·(n·l)/cosine: the half vector is turned from the normal by at least half as much as the light from
+  // the mirror direction.
+  static float importance(const SurfacePoint& p, float cosine, float beta) {
+    const float a2 = p.shape * p.shape, far = 0.5f * (1.0f - std::min(1.0f, beta));  // sin² of the half vector's turn
+    const float e = a2 * (1.0f - far) + far, nv = std::max(1e-4f, dot(p.normal, p.mirror));
+    const float largest =
+        a2 * std::numbers::inv_pi_v<float> / (e * e) * 0.5f / (cosine * ggx_root(a2, nv) + nv * ggx_root(a2, cosine));
+    return luminance(albedo(p)) * largest;
+  }
+};
 
 }  // namespace lumicut
 
@@ -76,67 +85,69 @@ inline Vec3f sample_ggx_reflection(float alpha, const Vec3f& normal, const Vec3f
 
 #include "bsdf/lanes-inl.h"
 
-#include "hwy/contrib/math/math-inl.h"
-
 HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// SIMD counterpart of ggx_terms: `lobe` is D·V, `fresnel` (1 − v·h)⁵. Finite for whatever cosines.
-HWY_INLINE void GgxLobe(D d, V alpha, V cosine, const V3& normal, const V3& mirror, const V3& to_light, V& lobe,
-                        V& fresnel) {
-  const V one = hn::Set(d, 1.0f);
-  const V a2 = hn::Mul(alpha, alpha), rest = hn::Sub(one, a2);
-  const V3 w{hn::Sub(to_light.x, mirror.x), hn::Sub(to_light.y, mirror.y), hn::Sub(to_light.z, mirror.z)};
-  const V nv = hn::Max(hn::Set(d, 1e-4f), Dot(normal, mirror)), nl = hn::Max(hn::Zero(d), cosine), nw = Dot(normal, w);
-  const V sum = hn::Add(nv, nl), sum2 = hn::Mul(sum, sum);
-  const V side2 = hn::Max(hn::Zero(d), hn::NegMulAdd(nw, nw, Dot(w, w)));
-  const V q = hn::Add(sum2, side2), e = hn::MulAdd(a2, sum2, side2);
-  const V root_v = hn::Sqrt(hn::MulAdd(hn::Mul(nv, nv), rest, a2)),
-          root_l = hn::Sqrt(hn::MulAdd(hn::Mul(nl, nl), rest, a2));
-  const V smith = hn::MulAdd(nl, root_v, hn::Mul(nv, root_l));
-  lobe = hn::Div(hn::Mul(hn::Mul(a2, hn::Set(d, 0.15915494309f)), hn::Mul(q, q)), hn::Mul(hn::Mul(e, e), smith));
-  const V m = hn::Max(hn::Zero(d), hn::NegMulAdd(hn::Set(d, 0.5f), hn::Sqrt(q), one)), m2 = hn::Mul(m, m);
-  fresnel = hn::Mul(hn::Mul(m2, m2), m);
-}
+// SIMD counterpart of lumicut::GgxReflection.
+struct GgxReflection {
+  static constexpr bool kFresnel = true, kBoundOverCosine = true, kAroundMirror = false;
+  // A part in 10^4 against the rounding of sharp lobes' angles.
+  static constexpr float kSlack = 1.0002f;
 
-// A part in 10^4 against the rounding of sharp lobes' angles.
-constexpr float kGgxSlack = 1.0002f;
+  // D·V and (1 − v·h)⁵, as ggx_terms has them. Finite for whatever cosines.
+  static HWY_INLINE LobeValue Value(D d, V alpha, const LobeDirections& at) {
+    const V one = hn::Set(d, 1.0f);
+    const V a2 = hn::Mul(alpha, alpha), rest = hn::Sub(one, a2);
+    const V3 &normal = at.normal, &mirror = at.mirror, &to_light = at.to_light;
+    const V3 w{hn::Sub(to_light.x, mirror.x), hn::Sub(to_light.y, mirror.y), hn::Sub(to_light.z, mirror.z)};
+    const V nv = hn::Max(hn::Set(d, 1e-4f), Dot(normal, mirror)), nl = hn::Max(hn::Zero(d), at.cosine),
+            nw = Dot(normal, w);
+    const V sum = hn::Add(nv, nl), sum2 = hn::Mul(sum, sum);
+    const V side2 = hn::Max(hn::Zero(d), hn::NegMulAdd(nw, nw, Dot(w, w)));
+    const V q = hn::Add(sum2, side2), e = hn::MulAdd(a2, sum2, side2);
+    const V root_v = hn::Sqrt(hn::MulAdd(hn::Mul(nv, nv), rest, a2)),
+            root_l = hn::Sqrt(hn::MulAdd(hn::Mul(nl, nl), rest, a2));
+    const V smith = hn::MulAdd(nl, root_v, hn::Mul(nv, root_l));
+    const V lobe =
+        hn::Div(hn::Mul(hn::Mul(a2, hn::Set(d, 0.15915494309f)), hn::Mul(q, q)), hn::Mul(hn::Mul(e, e), smith));
+    const V m = hn::Max(hn::Zero(d), hn::NegMulAdd(hn::Set(d, 0.5f), hn::Sqrt(q), one)), m2 = hn::Mul(m, m);
+    return {lobe, hn::Mul(hn::Mul(m2, m2), m)};
+  }
 
-// Largest D·V·(n·l) over `cosine`, of lights at most `cosine` to the normal and `beta` to the mirror direction, for
-// α² between `low2` and `high2` and n·v of `nv` or more. The half vector is turned from the normal by at least half as
-// much as the light from the mirror direction; D is largest where α² is that turn's squared tangent, V grows with n·l.
-HWY_INLINE V BoundOfGgxLobe(D d, V beta, V cosine, V low2, V high2, V nv) {
-  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-  beta = hn::Min(one, hn::Add(beta, hn::Set(d, 1e-6f)));
-  const V nl = hn::Min(one, hn::Max(cosine, hn::Set(d, 1e-7f)));
-  const V sine2 = hn::Mul(hn::Set(d, 0.5f), hn::Sub(one, beta)), cosine2 = hn::Sub(one, sine2);
-  const V best = hn::Div(sine2, hn::Max(cosine2, hn::Set(d, 1e-6f)));
-  const V a2 = hn::Min(high2, hn::Max(low2, best));
-  const V e = hn::MulAdd(a2, cosine2, sine2), rest = hn::Sub(one, low2);
-  nv = hn::Max(nv, hn::Set(d, 1e-4f));
-  const V root_v = hn::Sqrt(hn::Max(zero, hn::MulAdd(hn::Mul(nv, nv), rest, low2)));
-  const V root_l = hn::Sqrt(hn::Max(zero, hn::MulAdd(hn::Mul(nl, nl), rest, low2)));
-  const V smith = hn::MulAdd(nl, root_v, hn::Mul(nv, root_l));
-  return hn::Div(hn::Mul(a2, hn::Set(d, 0.15915494309f * kGgxSlack)), hn::Mul(hn::Mul(e, e), smith));
-}
+  // Largest D·V·(n·l) over the cone's cosine, and largest Fresnel term. The half vector is turned from the normal by at
+  // least half as much as the light from the mirror direction; D is largest where α² is that turn's squared tangent, V
+  // grows with n·l.
+  static HWY_INLINE LobeValue Bound(D d, const LobeCone& cone) {
+    const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+    const V low2 = hn::Mul(cone.low, cone.low), high2 = hn::Mul(cone.high, cone.high);
+    const V beta = hn::Min(one, hn::Add(cone.beta, hn::Set(d, 1e-6f)));
+    const V nl = hn::Min(one, hn::Max(cone.cosine, hn::Set(d, 1e-7f)));
+    const V sine2 = hn::Mul(hn::Set(d, 0.5f), hn::Sub(one, beta)), cosine2 = hn::Sub(one, sine2);
+    const V best = hn::Div(sine2, hn::Max(cosine2, hn::Set(d, 1e-6f)));
+    const V a2 = hn::Min(high2, hn::Max(low2, best));
+    const V e = hn::MulAdd(a2, cosine2, sine2), rest = hn::Sub(one, low2);
+    const V nv = hn::Max(cone.view_cosine, hn::Set(d, 1e-4f));
+    const V root_v = hn::Sqrt(hn::Max(zero, hn::MulAdd(hn::Mul(nv, nv), rest, low2)));
+    const V root_l = hn::Sqrt(hn::Max(zero, hn::MulAdd(hn::Mul(nl, nl), rest, low2)));
+    const V smith = hn::MulAdd(nl, root_v, hn::Mul(nv, root_l));
+    const V lobe = hn::Div(hn::Mul(a2, hn::Set(d, 0.15915494309f * kSlack)), hn::Mul(hn::Mul(e, e), smith));
+    return {lobe, BoundOfFresnel(d, cone.beta, cone.view_cosine)};
+  }
 
-// Largest (1 − v·h)⁵: lights are at most `beta` to the mirror direction and above the horizon, views at least `nv` to
-// the normal.
-HWY_INLINE V BoundOfFresnel(D d, V beta, V nv) {
-  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-  const V sine = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(nv, nv, one)));
-  const V apart = hn::Min(hn::Add(sine, hn::Set(d, 1e-6f)), hn::Add(beta, hn::Set(d, 1e-6f)));  // −v·l, at most
-  const V vh = hn::Sqrt(hn::Max(zero, hn::Mul(hn::Set(d, 0.5f), hn::Sub(one, apart))));
-  const V m = hn::Sub(one, vh), m2 = hn::Mul(m, m);
-  return hn::Mul(hn::Mul(m2, m2), m);
-}
+  // Largest (1 − v·h)⁵: lights are at most `beta` to the mirror direction and above the horizon, views at least `nv` to
+  // the normal.
+  static HWY_INLINE V BoundOfFresnel(D d, V beta, V nv) {
+    const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+    const V sine = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(nv, nv, one)));
+    const V apart = hn::Min(hn::Add(sine, hn::Set(d, 1e-6f)), hn::Add(beta, hn::Set(d, 1e-6f)));  // −v·l, at most
+    const V vh = hn::Sqrt(hn::Max(zero, hn::Mul(hn::Set(d, 0.5f), hn::Sub(one, apart))));
+    const V m = hn::Sub(one, vh), m2 = hn::Mul(m, m);
+    return hn::Mul(hn::Mul(m2, m2), m);
+  }
 
-// specular + (grazing − specular)·fresnel, where that is more.
-HWY_INLINE V3 BoundOfSchlick(D d, const V3& specular, const V3& grazing, V fresnel) {
-  const auto one = [&](V s, V g) { return hn::MulAdd(hn::Max(hn::Zero(d), hn::Sub(g, s)), fresnel, s); };
-  return {one(specular.x, grazing.x), one(specular.y, grazing.y), one(specular.z, grazing.z)};
-}
+  static HWY_INLINE V Width(D d, V alpha) { return hn::Mul(hn::Set(d, 2.0f), hn::Mul(alpha, alpha)); }
+};
 
 }  // namespace lumicut::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

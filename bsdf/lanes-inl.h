@@ -17,6 +17,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using D = hn::CappedTag<float, kLanes>;
 using V = hn::Vec<D>;
+using DU = hn::RebindToUnsigned<D>;
 
 struct V3 {
   V x, y, z;
@@ -32,6 +33,28 @@ HWY_INLINE V3 Load3(D d, const std::vector<float> (&a)[3], size_t i) {
 }
 HWY_INLINE V Load1(D d, const float (&a)[kLanes], size_t i) { return hn::Load(d, a + i); }
 HWY_INLINE V Load1(D d, const std::vector<float>& a, size_t i) { return hn::LoadU(d, a.data() + i); }
+HWY_INLINE hn::Vec<DU> Load1(DU d, const uint32_t (&a)[kLanes], size_t i) { return hn::Load(d, a + i); }
+HWY_INLINE hn::Vec<DU> Load1(DU d, const std::vector<uint32_t>& a, size_t i) { return hn::LoadU(d, a.data() + i); }
+
+// One SurfacePoint in all lanes, in place of ShadePoints or a PointBlock.
+HWY_INLINE V3 Load3(D d, const Vec3f& v, size_t) { return Set3(d, v); }
+HWY_INLINE V Load1(D d, float v, size_t) { return hn::Set(d, v); }
+HWY_INLINE hn::Vec<DU> Load1(DU d, uint32_t v, size_t) { return hn::Set(d, v); }
+
+// What a glossy lobe is evaluated at: unit vectors, and the light's cosines to normal and mirror direction.
+struct LobeDirections {
+  const V3 &normal, &mirror, &to_light;
+  V cosine, beta;
+};
+// What it is bounded over: lights of at most `cosine` to the normal and `beta` to the mirror direction, shapes from
+// `low` to `high`, views of at least `view_cosine` to the normal.
+struct LobeCone {
+  V cosine, beta, low, high, view_cosine;
+};
+// lobe · (specular·(1 − fresnel) + grazing·fresnel), without the cosine. 1/sr
+struct LobeValue {
+  V lobe, fresnel;
+};
 
 // Bits [i, i + Lanes(d)) of `bits`, and back.
 HWY_INLINE hn::Mask<D> MaskOf(D d, uint32_t bits, size_t i) {

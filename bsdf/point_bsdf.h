@@ -4,31 +4,27 @@
 
 #include <optional>
 
-#include "bsdf/cosine_lobe.h"
-#include "bsdf/ggx_reflection.h"
 #include "bsdf/lambert.h"
-#include "bsdf/shade_points.h"
+#include "bsdf/lobes.h"
 
 namespace lumicut {
 
 // Share of the light that the glossy lobe sends back, roughly.
 inline Rgb specular_albedo(const SurfacePoint& p) {
-  if (!p.ggx()) return p.specular * (2.0f * std::numbers::pi_v<float> / (p.exponent + 1.0f));
-  return p.specular + max(p.grazing - p.specular, Rgb{}) * schlick_share(dot(p.normal, p.mirror));
+  return with_lobe(p, [&](auto lobe) { return lobe.albedo(p); });
 }
 
 // BRDF towards `to_light` (unit), without the cosine.
 inline Rgb reflectance(const SurfacePoint& p, const Vec3f& to_light) {
-  Rgb f = p.diffuse;
-  if (p.ggx()) {
-    f *= diffuse_falloff(p.falloff, dot(p.normal, to_light));
-    const GgxTerms t = ggx_terms(p.alpha, p.normal, p.mirror, to_light);
-    f += (p.specular * (1.0f - t.fresnel) + p.grazing * t.fresnel) * (t.distribution * t.visibility);
-    return f;
-  }
-  const float beta = dot(p.mirror, to_light);
-  if (beta > 0.0f) f += p.specular * std::pow(std::min(1.0f, beta), p.exponent);
+  Rgb f = p.diffuse * diffuse_falloff(p.falloff, dot(p.normal, to_light));
+  f += with_lobe(p, [&](auto lobe) { return lobe.value(p, to_light); });
   return f;
+}
+
+// About the largest luminance of the glossy lobe over directions of at most `cosine` to the normal and `beta` to the
+// mirror direction; above 0 wherever the lobe is.
+inline float lobe_importance(const SurfacePoint& p, float cosine, float beta) {
+  return with_lobe(p, [&](auto lobe) { return lobe.importance(p, cosine, beta); });
 }
 
 enum BsdfFlags : uint32_t { kReflected = 1, kTransmitted = 2, kSpecular = 4 };
@@ -59,8 +55,7 @@ class PointBsdf {
     const float p = diffuse_share_ * cosine * std::numbers::inv_pi_v<float>;
     if (!(diffuse_share_ < 1.0f)) return p;
     const float share = 1.0f - diffuse_share_;
-    return p + (point_.ggx() ? ggx_reflection_pdf(share, point_.alpha, point_.normal, point_.mirror, direction)
-                             : cosine_lobe_pdf(share, point_.exponent, dot(point_.mirror, direction)));
+    return p + with_lobe(point_, [&](auto lobe) { return lobe.pdf(share, point_, direction); });
   }
 
   // `choice`, `u`, `v` in [0, 1). Empty where nothing is reflected that way.
@@ -68,8 +63,7 @@ class PointBsdf {
     if (black_) return {};
     BsdfSample s;
     s.direction = choice < diffuse_share_ ? sample_cosine_hemisphere(point_.normal, u, v)
-                  : point_.ggx()          ? sample_ggx_reflection(point_.alpha, point_.normal, point_.mirror, u, v)
-                                          : sample_cosine_lobe(point_.mirror, point_.exponent, u, v);
+                                          : with_lobe(point_, [&](auto lobe) { return lobe.sample(point_, u, v); });
     s.pdf = pdf(s.direction);
     if (!(s.pdf > 0.0f)) return {};
     s.weight = reflectance(point_, s.direction) * (dot(point_.normal, s.direction) / s.pdf);

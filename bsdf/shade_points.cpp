@@ -1,28 +1,28 @@
 #include "bsdf/shade_points.h"
 
+#include <algorithm>
+
 namespace lumicut {
 
 namespace {
-// Every float array of the structure, so that no member function can forget one.
+// Every array of the structure, so that no member function can forget one.
 template <typename Points, typename Fn>
 void for_each_array(Points& p, Fn fn) {
   for (int k = 0; k < 3; ++k)
     fn(p.position[k]), fn(p.normal[k]), fn(p.mirror[k]), fn(p.diffuse[k]), fn(p.specular[k]), fn(p.grazing[k]);
-  fn(p.exponent), fn(p.falloff), fn(p.alpha);
+  fn(p.shape), fn(p.falloff), fn(p.lobe), fn(p.pixel);
 }
 }  // namespace
 
 void ShadePoints::clear() {
   for_each_array(*this, [](auto& a) { a.clear(); });
-  pixel.clear();
   size_ = 0;
-  glossy_ = ggx_ = false;
+  lobes_ = Lobes::none;
 }
 
 void ShadePoints::reserve(size_t n) {
   n = round_up_to_lanes(n);
   for_each_array(*this, [n](auto& a) { a.reserve(n); });
-  pixel.reserve(n);
 }
 
 void ShadePoints::push(const SurfacePoint& p) {
@@ -34,10 +34,9 @@ void ShadePoints::push(const SurfacePoint& p) {
     specular[k].push_back(p.specular[k]);
     grazing[k].push_back(p.grazing[k]);
   }
-  exponent.push_back(p.exponent), falloff.push_back(p.falloff), alpha.push_back(p.alpha);
-  pixel.push_back(p.pixel);
-  ggx_ = ggx_ || p.ggx();
-  glossy_ = glossy_ || p.ggx() || max_component(p.specular) > 0.0f;
+  shape.push_back(p.shape), falloff.push_back(p.falloff);
+  lobe.push_back(p.lobe), pixel.push_back(p.pixel);
+  lobes_ = std::max(lobes_, p.lobes());
   ++size_;
 }
 
@@ -45,13 +44,12 @@ void ShadePoints::finish() {
   if (size_ == 0) return;
   const size_t padded = round_up_to_lanes(size_);
   for_each_array(*this, [&](auto& a) { a.resize(padded, a[size_ - 1]); });
-  pixel.resize(padded, pixel[size_ - 1]);
 }
 
 SurfacePoint ShadePoints::get(size_t i) const {
   const auto at = [i](const std::vector<float>(&a)[3]) { return Vec3f{a[0][i], a[1][i], a[2][i]}; };
-  return {at(position), at(normal), at(mirror),  at(diffuse), at(specular),
-          exponent[i],  pixel[i],   at(grazing), falloff[i],  alpha[i]};
+  return {at(position), at(normal), at(mirror), at(diffuse), at(specular),
+          at(grazing),  shape[i],   lobe[i],    falloff[i],  pixel[i]};
 }
 
 }  // namespace lumicut

@@ -12,34 +12,40 @@ namespace lumicut {
 inline constexpr size_t kLanes = 16;
 inline constexpr size_t round_up_to_lanes(size_t n) { return (n + kLanes - 1) / kLanes * kLanes; }
 
+// Which glossy lobes points have, as far as kernels tell: none; the papers' cosine lobe alone, with neither Fresnel's term
+// nor a falloff of the diffuse part; or any of bsdf/lobes.h. Each stands for those before it too.
+enum class Lobes : uint8_t { none, cosine, all };
+inline constexpr uint32_t kCosineLobe = 0;  // its place in the list of bsdf/lobes.h
+
 // A surface seen from one side: the shading normal is turned to the viewer.
 struct SurfacePoint {
-  Vec3f position;         // offset from the surface by the scene's epsilon: shadow rays start here
-  Vec3f normal;           // unit, on the viewer's side
-  Vec3f mirror;           // unit: the view direction mirrored about `normal`
-  Rgb diffuse;            // kd/π
-  Rgb specular;           // cosine lobe: its factor before cosⁿβ (bsdf/cosine_lobe.h); GGX: F0, at normal incidence
-  float exponent = 0.0f;  // n of a cosine lobe
-  uint32_t pixel = 0;     // points of one pixel lie together
-  Rgb grazing{};          // GGX: F90, at grazing incidence
-  float falloff = 0.0f;   // of the diffuse part towards grazing light (bsdf/lambert.h)
-  float alpha = 0.0f;     // GGX: roughness², above 0; 0: a cosine lobe
+  Vec3f position;      // offset from the surface by the scene's epsilon: shadow rays start here
+  Vec3f normal;        // unit, on the viewer's side
+  Vec3f mirror;        // unit: the view direction mirrored about `normal`
+  Rgb diffuse;         // kd/π
+  Rgb specular;        // of the glossy lobe; cosine lobe: its factor before cosⁿβ; GGX: F0, at normal incidence
+  Rgb grazing{};       // GGX: F90, at grazing incidence
+  float shape = 0.0f;  // of the glossy lobe; cosine lobe: the exponent n; GGX: α = roughness², above 0
+  uint32_t lobe = kCosineLobe;  // which one: its place in the list of bsdf/lobes.h
+  float falloff = 0.0f;         // of the diffuse part towards grazing light (bsdf/lambert.h)
+  uint32_t pixel = 0;           // points of one pixel lie together
 
-  bool ggx() const { return alpha > 0.0f; }
+  Lobes lobes() const {
+    if (lobe != kCosineLobe || falloff > 0.0f) return Lobes::all;
+    return max_component(specular) > 0.0f ? Lobes::cosine : Lobes::none;
+  }
   // All light that it reflects, times `factor`: what a path has lost on its way here.
   void attenuate(const Rgb& factor) { diffuse *= factor, specular *= factor, grazing *= factor; }
 };
 
 struct ShadePoints {
   // position, normal, mirror, diffuse, specular, grazing: [component][point]
-  std::vector<float> position[3], normal[3], mirror[3], diffuse[3], specular[3], grazing[3], exponent, falloff, alpha;
-  std::vector<uint32_t> pixel;
+  std::vector<float> position[3], normal[3], mirror[3], diffuse[3], specular[3], grazing[3], shape, falloff;
+  std::vector<uint32_t> lobe, pixel;
 
   size_t size() const { return size_; }
-  // True where any point has a glossy lobe; loops skip it otherwise.
-  bool glossy() const { return glossy_; }
-  // True where any point is GGX's.
-  bool ggx() const { return ggx_; }
+  // Of any of the points: kernels skip what none has.
+  Lobes lobes() const { return lobes_; }
   void clear();
   void reserve(size_t n);
   void push(const SurfacePoint& p);
@@ -51,7 +57,7 @@ struct ShadePoints {
 
  private:
   size_t size_ = 0;
-  bool glossy_ = false, ggx_ = false;
+  Lobes lobes_ = Lobes::none;
 };
 
 }  // namespace lumicut

@@ -9,6 +9,7 @@
 
 #include "bsdf/reflectance-inl.h"
 #include "clustering/bounds.h"
+#include "clustering/kernel_dispatch-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
@@ -108,113 +109,88 @@ HWY_INLINE V3 GrownBySpheres(D d, const V3& half, const LightNode& node) {
 // light_node_bounds of one kind of light. Departs from Walter et al.: luminance is bounded through each colour channel
 // on its own, so a blue lamp over a red wall costs nothing; and the cosine to the light's cone and to the surface are
 // bounded in their own frames each.
-template <VplKind kKind, Lobes kLobes>
-HWY_INLINE void Bounds(const LightNode& node, const PointBlock& block, float clamp2, float* HWY_RESTRICT bounds) {
-  const D d;
-  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-  constexpr bool kSpheres = kKind == VplKind::sphere;
-  const V3 center = Set3(d, node.center), axis = Set3(d, node.axis), places = Set3(d, node.half);
-  const V3 half = kSpheres ? GrownBySpheres(d, places, node) : places;
-  const V3 frame_half = kSpheres ? GrownBySpheres(d, Set3(d, node.frame_half), node) : Set3(d, node.frame_half);
-  const V cos_half = hn::Set(d, node.cos_half), sin_half = hn::Set(d, node.sin_half);
-  for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
-    const V3 normal = Load3(d, block.normal, i);
-    V cosine, geometry;  // at the surface; at the light, with the distance
-    V steep = one;       // spheres: the largest cosine over the mean one, for lobes that are bounded with it
-    V3 to_center = {zero, zero, zero};
-    if constexpr (kKind == VplKind::directional) {
-      cosine = WidenByCone(d, hn::Neg(Dot(normal, axis)), cos_half, sin_half);
-      geometry = one;
-    } else {
-      const V3 position = Load3(d, block.position, i);
-      to_center = {hn::Sub(center.x, position.x), hn::Sub(center.y, position.y), hn::Sub(center.z, position.z)};
-      const V dist2 = kSpheres ? Dist2(d, to_center, places) : zero,
-              across = kSpheres ? SpheresAcross(d, node, dist2) : zero;
-      if constexpr (kSpheres)
-        geometry = BoundOfSolidAngle(d, node, dist2);
-      else
-        geometry = hn::Div(one, hn::Max(hn::Max(Dist2(d, to_center, half), hn::Set(d, clamp2)), hn::Set(d, 1e-30f)));
-      if constexpr (kKind == VplKind::oriented || kKind == VplKind::spot || kSpheres) {
-        // From the lights to the point: the box turned around.
-        const V x = hn::Neg(Dot(to_center, Set3(d, node.tangent))),
-                y = hn::Neg(Dot(to_center, Set3(d, node.bitangent)));
-        const V z = hn::Neg(Dot(to_center, axis));
-        const V c = LargestCosine(d, x, y, z, frame_half.x, frame_half.y, frame_half.z);
+struct BoundsKernel {
+  template <VplKind kKind, Lobes kLobes>
+  static HWY_INLINE void Run(const LightNode& node, const PointBlock& block, float clamp2, float* HWY_RESTRICT bounds) {
+    const D d;
+    const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+    constexpr bool kSpheres = kKind == VplKind::sphere;
+    const V3 center = Set3(d, node.center), axis = Set3(d, node.axis), places = Set3(d, node.half);
+    const V3 half = kSpheres ? GrownBySpheres(d, places, node) : places;
+    const V3 frame_half = kSpheres ? GrownBySpheres(d, Set3(d, node.frame_half), node) : Set3(d, node.frame_half);
+    const V cos_half = hn::Set(d, node.cos_half), sin_half = hn::Set(d, node.sin_half);
+    for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
+      const V3 normal = Load3(d, block.normal, i);
+      V cosine, geometry;  // at the surface; at the light, with the distance
+      V steep = one;       // spheres: the largest cosine over the mean one, for lobes that are bounded with it
+      V3 to_center = {zero, zero, zero};
+      if constexpr (kKind == VplKind::directional) {
+        cosine = WidenByCone(d, hn::Neg(Dot(normal, axis)), cos_half, sin_half);
+        geometry = one;
+      } else {
+        const V3 position = Load3(d, block.position, i);
+        to_center = {hn::Sub(center.x, position.x), hn::Sub(center.y, position.y), hn::Sub(center.z, position.z)};
+        const V dist2 = kSpheres ? Dist2(d, to_center, places) : zero,
+                across = kSpheres ? SpheresAcross(d, node, dist2) : zero;
+        if constexpr (kSpheres)
+          geometry = BoundOfSolidAngle(d, node, dist2);
+        else
+          geometry = hn::Div(one, hn::Max(hn::Max(Dist2(d, to_center, half), hn::Set(d, clamp2)), hn::Set(d, 1e-30f)));
+        if constexpr (kKind == VplKind::oriented || kKind == VplKind::spot || kSpheres) {
+          // From the lights to the point: the box turned around.
+          const V x = hn::Neg(Dot(to_center, Set3(d, node.tangent))),
+                  y = hn::Neg(Dot(to_center, Set3(d, node.bitangent)));
+          const V z = hn::Neg(Dot(to_center, axis));
+          const V c = LargestCosine(d, x, y, z, frame_half.x, frame_half.y, frame_half.z);
+          if constexpr (kSpheres) {
+            const V mean = LargestCosine(d, x, y, z, hn::Set(d, node.frame_half.x), hn::Set(d, node.frame_half.y),
+                                         hn::Set(d, node.frame_half.z));
+            geometry = hn::Mul(geometry, MeanOverSpheres(d, WidenByCone(d, mean, cos_half, sin_half), across));
+            geometry = hn::IfThenElseZero(hn::Gt(WidenByCone(d, c, cos_half, sin_half), zero), geometry);
+          } else if constexpr (kKind == VplKind::oriented) {
+            geometry = hn::Mul(geometry, hn::Max(zero, WidenByCone(d, c, cos_half, sin_half)));
+          } else {
+            geometry = hn::IfThenElseZero(hn::Ge(hn::Add(c, hn::Set(d, 1e-5f)), cos_half), geometry);
+          }
+        }
+        const V3 tangent = Load3(d, block.tangent, i), bitangent = Load3(d, block.bitangent, i);
+        cosine = CosineToBox(d, to_center, half, tangent, bitangent, normal);
         if constexpr (kSpheres) {
-          const V mean = LargestCosine(d, x, y, z, hn::Set(d, node.frame_half.x), hn::Set(d, node.frame_half.y),
-                                       hn::Set(d, node.frame_half.z));
-          geometry = hn::Mul(geometry, MeanOverSpheres(d, WidenByCone(d, mean, cos_half, sin_half), across));
-          geometry = hn::IfThenElseZero(hn::Gt(WidenByCone(d, c, cos_half, sin_half), zero), geometry);
-        } else if constexpr (kKind == VplKind::oriented) {
-          geometry = hn::Mul(geometry, hn::Max(zero, WidenByCone(d, c, cos_half, sin_half)));
-        } else {
-          geometry = hn::IfThenElseZero(hn::Ge(hn::Add(c, hn::Set(d, 1e-5f)), cos_half), geometry);
+          const V mean = MeanOverSpheres(d, CosineToBox(d, to_center, places, tangent, bitangent, normal), across);
+          geometry = hn::IfThenElseZero(hn::Gt(cosine, zero), hn::Mul(geometry, mean));
+          steep = hn::Div(hn::Max(zero, cosine), hn::Max(mean, hn::Set(d, 1e-20f)));
         }
       }
-      const V3 tangent = Load3(d, block.tangent, i), bitangent = Load3(d, block.bitangent, i);
-      cosine = CosineToBox(d, to_center, half, tangent, bitangent, normal);
-      if constexpr (kSpheres) {
-        const V mean = MeanOverSpheres(d, CosineToBox(d, to_center, places, tangent, bitangent, normal), across);
-        geometry = hn::IfThenElseZero(hn::Gt(cosine, zero), hn::Mul(geometry, mean));
-        steep = hn::Div(hn::Max(zero, cosine), hn::Max(mean, hn::Set(d, 1e-20f)));
-      }
-    }
-    if constexpr (!kSpheres) geometry = hn::Mul(geometry, hn::Max(zero, cosine));
-    V3 f = Load3(d, block.diffuse, i);
-    if constexpr (kLobes != Lobes::none) {
-      const V3 mirror = Load3(d, block.mirror, i), specular = Load3(d, block.specular, i);
-      V beta;
-      if constexpr (kKind == VplKind::directional)
-        beta = WidenByCone(d, hn::Neg(Dot(mirror, axis)), cos_half, sin_half);
-      else
-        beta = CosineToBox(d, to_center, half, Load3(d, block.mirror_tangent, i), Load3(d, block.mirror_bitangent, i),
-                           mirror);
-      const LobeShape shape = LoadShape<kLobes>(d, block, i);
-      if constexpr (kLobes == Lobes::cosine) {
-        const V lobe = BoundOfCosineLobe(d, beta, shape.exponent);
-        f = {hn::MulAdd(specular.x, lobe, f.x), hn::MulAdd(specular.y, lobe, f.y), hn::MulAdd(specular.z, lobe, f.z)};
-      } else {
-        const auto ggx = shape.is_ggx(d);
-        V lobe = hn::AllTrue(d, ggx) ? zero : BoundOfCosineLobe(d, beta, shape.exponent);
-        V3 share = specular;
-        if (!hn::AllFalse(d, ggx)) {
-          const V nv = Dot(normal, mirror), alpha2 = Square(shape.alpha);
-          V ggx_lobe = BoundOfGgxLobe(d, beta, cosine, alpha2, alpha2, nv);
-          if constexpr (kSpheres) ggx_lobe = hn::Mul(ggx_lobe, steep);
-          lobe = hn::IfThenElse(ggx, ggx_lobe, lobe);
-          const V fresnel = hn::IfThenElseZero(ggx, BoundOfFresnel(d, beta, nv));
-          share = BoundOfSchlick(d, specular, Load3(d, block.grazing, i), fresnel);
+      if constexpr (!kSpheres) geometry = hn::Mul(geometry, hn::Max(zero, cosine));
+      V3 f = Load3(d, block.diffuse, i);
+      if constexpr (kLobes != Lobes::none) {
+        const V3 mirror = Load3(d, block.mirror, i), specular = Load3(d, block.specular, i);
+        V beta;
+        if constexpr (kKind == VplKind::directional)
+          beta = WidenByCone(d, hn::Neg(Dot(mirror, axis)), cos_half, sin_half);
+        else
+          beta = CosineToBox(d, to_center, half, Load3(d, block.mirror_tangent, i), Load3(d, block.mirror_bitangent, i),
+                             mirror);
+        const LobeShape shape = LoadShape<kLobes>(d, block, i);
+        const LobeValue bound =
+            BoundOfLobes<kLobes>(d, shape, {cosine, beta, shape.shape, shape.shape, Dot(normal, mirror)}, steep);
+        V3 color = specular;
+        if constexpr (kLobes == Lobes::all) {
+          color = BoundOfColor(d, specular, Load3(d, block.grazing, i), bound.fresnel);
           const V falloff = BoundOfDiffuseFalloff(d, hn::Load(d, block.falloff + i), cosine);
           f = {hn::Mul(f.x, falloff), hn::Mul(f.y, falloff), hn::Mul(f.z, falloff)};
         }
-        f = {hn::MulAdd(share.x, lobe, f.x), hn::MulAdd(share.y, lobe, f.y), hn::MulAdd(share.z, lobe, f.z)};
+        f = {hn::MulAdd(color.x, bound.lobe, f.x), hn::MulAdd(color.y, bound.lobe, f.y),
+             hn::MulAdd(color.z, bound.lobe, f.z)};
       }
+      hn::StoreU(BoundOfLuminance(d, f, geometry, node.intensity), d, bounds + i);
     }
-    hn::StoreU(BoundOfLuminance(d, f, geometry, node.intensity), d, bounds + i);
   }
-}
-
-template <VplKind kKind>
-HWY_INLINE void BoundsOfKind(const LightNode& node, const PointBlock& block, float clamp2, float* bounds) {
-  if (!block.glossy) return Bounds<kKind, Lobes::none>(node, block, clamp2, bounds);
-  block.ggx ? Bounds<kKind, Lobes::ggx>(node, block, clamp2, bounds)
-            : Bounds<kKind, Lobes::cosine>(node, block, clamp2, bounds);
-}
+};
 
 // light_node_bounds, to be inlined.
 HWY_INLINE void NodeBounds(const LightNode& node, const PointBlock& block, float clamp2, float* HWY_RESTRICT bounds) {
-  switch (node.kind) {
-    case VplKind::omni:
-      return BoundsOfKind<VplKind::omni>(node, block, clamp2, bounds);
-    case VplKind::oriented:
-      return BoundsOfKind<VplKind::oriented>(node, block, clamp2, bounds);
-    case VplKind::directional:
-      return BoundsOfKind<VplKind::directional>(node, block, clamp2, bounds);
-    case VplKind::spot:
-      return BoundsOfKind<VplKind::spot>(node, block, clamp2, bounds);
-    case VplKind::sphere:
-      return BoundsOfKind<VplKind::sphere>(node, block, clamp2, bounds);
-  }
+  RunKernel<BoundsKernel>(node.kind, block.lobes, node, block, clamp2, bounds);
 }
 
 }  // namespace lumicut::HWY_NAMESPACE

@@ -26,8 +26,7 @@ void light_node_bounds(const LightNode& node, const PointBlock& block, float cla
 }
 
 void PointBlock::load(const ShadePoints& points, size_t first) {
-  glossy = points.glossy();
-  ggx = false;
+  lobes = Lobes::none;
   for (size_t i = 0; i < kLanes; ++i) {
     const SurfacePoint p = points.get(first + i);
     const Frame n(p.normal), m(p.mirror);
@@ -37,8 +36,8 @@ void PointBlock::load(const ShadePoints& points, size_t first) {
       mirror[k][i] = p.mirror[k], mirror_tangent[k][i] = m.t[k], mirror_bitangent[k][i] = m.b[k];
       diffuse[k][i] = p.diffuse[k], specular[k][i] = p.specular[k], grazing[k][i] = p.grazing[k];
     }
-    exponent[i] = p.exponent, falloff[i] = p.falloff, alpha[i] = p.alpha;
-    ggx = ggx || p.ggx();
+    shape[i] = p.shape, falloff[i] = p.falloff, lobe[i] = p.lobe;
+    lobes = std::max(lobes, p.lobes());
   }
 }
 

@@ -13,8 +13,9 @@ struct alignas(64) PointBlock {
   float normal[3][kLanes], tangent[3][kLanes], bitangent[3][kLanes];
   float mirror[3][kLanes], mirror_tangent[3][kLanes], mirror_bitangent[3][kLanes];
   float diffuse[3][kLanes], specular[3][kLanes], grazing[3][kLanes];
-  float exponent[kLanes], falloff[kLanes], alpha[kLanes];
-  bool glossy = false, ggx = false;  // any of the points
+  float shape[kLanes], falloff[kLanes];
+  uint32_t lobe[kLanes];
+  Lobes lobes = Lobes::none;  // of any of the points
 
   // Points [first, first + kLanes) of `points`, first a multiple of kLanes.
   void load(const ShadePoints& points, size_t first);

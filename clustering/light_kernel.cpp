@@ -6,6 +6,7 @@
 #define HWY_TARGET_INCLUDE "clustering/light_kernel.cpp"
 #include "hwy/foreach_target.h"  // compiles this file once a target; before highway.h
 
+#include "clustering/kernel_dispatch-inl.h"
 #include "clustering/light_kernel-inl.h"
 #include "clustering/sphere_integral-inl.h"
 
@@ -26,98 +27,84 @@ HWY_INLINE V MeanCosine(D d, const Vec3f& normal, const DirectionScatter& s, con
   return hn::Mul(hn::Set(d, 0.5f), hn::Add(c, hn::Sqrt(hn::MulAdd(c, c, scatter))));
 }
 
-template <VplKind kKind, Lobes kLobes, bool kScatter = false>
-HWY_INLINE size_t Light(const Vpl& light, const Rgb& intensity, Falloff falloff, const ShadePoints& points,
-                        size_t first, size_t count, LitPoints& lit, const uint16_t* wanted,
-                        const DirectionScatter* scatter = nullptr) {
-  const D d;
-  const size_t lanes = hn::Lanes(d);
-  const V zero = hn::Zero(d);
-  size_t kept = 0;
-  for (size_t i = 0; i < count; i += lanes) {
-    const size_t p = first + i;
-    // Points past the end are copies of the last one: they are lit too, but not kept.
-    auto inside = hn::FirstN(d, std::min(lanes, count - i));
-    if (wanted != nullptr) {
-      const uint32_t bits = wanted[i / kLanes];
-      if ((bits >> (i % kLanes) & ((1u << lanes) - 1)) == 0) continue;
-      inside = hn::And(inside, MaskOf(d, bits, i % kLanes));
+// `kScatter`: the light is the mean of a cluster.
+template <bool kScatter>
+struct LightKernel {
+  template <VplKind kKind, Lobes kLobes>
+  static HWY_INLINE size_t Run(const Vpl& light, const Rgb& intensity, Falloff falloff, const ShadePoints& points,
+                               size_t first, size_t count, LitPoints& lit, const uint16_t* wanted,
+                               const DirectionScatter* scatter) {
+    const D d;
+    const size_t lanes = hn::Lanes(d);
+    const V zero = hn::Zero(d);
+    size_t kept = 0;
+    for (size_t i = 0; i < count; i += lanes) {
+      const size_t p = first + i;
+      // Points past the end are copies of the last one: they are lit too, but not kept.
+      auto inside = hn::FirstN(d, std::min(lanes, count - i));
+      if (wanted != nullptr) {
+        const uint32_t bits = wanted[i / kLanes];
+        if ((bits >> (i % kLanes) & ((1u << lanes) - 1)) == 0) continue;
+        inside = hn::And(inside, MaskOf(d, bits, i % kLanes));
+      }
+      const V3 position = Load3(d, points.position, p), normal = Load3(d, points.normal, p);
+      V3 to_light;
+      V geometry;
+      V3 f;
+      hn::Mask<D> reached;
+      if constexpr (kKind == VplKind::sphere) {
+        f = SphereRadiance<kLobes, !kScatter>(d, light, points, p, position, normal, to_light);
+        geometry = kScatter ? MeanCosine(d, light.normal, *scatter, to_light) : hn::Set(d, 1.0f);
+        reached = inside;
+      } else {
+        constexpr VplKind kShape = kScatter ? VplKind::omni : kKind;
+        geometry = Geometry<kShape>(d, light, falloff, position, normal, to_light);
+        if constexpr (kScatter) geometry = hn::Mul(geometry, MeanCosine(d, light.normal, *scatter, to_light));
+        reached = hn::And(hn::Gt(geometry, zero), inside);
+        if (hn::AllFalse(d, reached)) continue;
+        f = Reflectance<kLobes>(d, points, p, normal, to_light);
+      }
+      const V r = hn::Mul(hn::Mul(f.x, geometry), hn::Set(d, intensity.x));
+      const V g = hn::Mul(hn::Mul(f.y, geometry), hn::Set(d, intensity.y));
+      const V b = hn::Mul(hn::Mul(f.z, geometry), hn::Set(d, intensity.z));
+      const auto keep = hn::And(reached, hn::Gt(hn::Add(r, hn::Add(g, b)), zero));
+      // Through a register: compressing into memory is microcode on Zen 4. The arrays have room for a whole vector.
+      const hn::RebindToUnsigned<D> du;
+      const auto index = hn::Iota(du, static_cast<uint32_t>(i));
+      hn::StoreU(hn::Compress(index, hn::RebindMask(du, keep)), du, lit.index + kept);
+      const auto put = [&](V v, float* to) { hn::StoreU(hn::Compress(v, keep), d, to); };
+      put(position.x, lit.x + kept);
+      put(position.y, lit.y + kept);
+      put(position.z, lit.z + kept);
+      put(r, lit.r + kept);
+      put(g, lit.g + kept);
+      put(b, lit.b + kept);
+      kept += hn::CountTrue(d, keep);
     }
-    const V3 position = Load3(d, points.position, p), normal = Load3(d, points.normal, p);
-    V3 to_light;
-    V geometry;
-    V3 f;
-    hn::Mask<D> reached;
-    if constexpr (kKind == VplKind::sphere) {
-      f = SphereRadiance<kLobes, !kScatter>(d, light, points, p, position, normal, to_light);
-      geometry = kScatter ? MeanCosine(d, light.normal, *scatter, to_light) : hn::Set(d, 1.0f);
-      reached = inside;
-    } else {
-      constexpr VplKind kShape = kScatter ? VplKind::omni : kKind;
-      geometry = Geometry<kShape>(d, light, falloff, position, normal, to_light);
-      if constexpr (kScatter) geometry = hn::Mul(geometry, MeanCosine(d, light.normal, *scatter, to_light));
-      reached = hn::And(hn::Gt(geometry, zero), inside);
-      if (hn::AllFalse(d, reached)) continue;
-      f = Reflectance<kLobes>(d, points, p, normal, to_light);
-    }
-    const V r = hn::Mul(hn::Mul(f.x, geometry), hn::Set(d, intensity.x));
-    const V g = hn::Mul(hn::Mul(f.y, geometry), hn::Set(d, intensity.y));
-    const V b = hn::Mul(hn::Mul(f.z, geometry), hn::Set(d, intensity.z));
-    const auto keep = hn::And(reached, hn::Gt(hn::Add(r, hn::Add(g, b)), zero));
-    // Through a register: compressing into memory is microcode on Zen 4. The arrays have room for a whole vector.
-    const hn::RebindToUnsigned<D> du;
-    const auto index = hn::Iota(du, static_cast<uint32_t>(i));
-    hn::StoreU(hn::Compress(index, hn::RebindMask(du, keep)), du, lit.index + kept);
-    const auto put = [&](V v, float* to) { hn::StoreU(hn::Compress(v, keep), d, to); };
-    put(position.x, lit.x + kept);
-    put(position.y, lit.y + kept);
-    put(position.z, lit.z + kept);
-    put(r, lit.r + kept);
-    put(g, lit.g + kept);
-    put(b, lit.b + kept);
-    kept += hn::CountTrue(d, keep);
+    return kept;
   }
-  return kept;
-}
-
-template <VplKind kKind, bool kScatter = false>
-HWY_INLINE size_t LightKind(const Vpl& light, const Rgb& intensity, Falloff falloff, const ShadePoints& points,
-                            size_t first, size_t count, LitPoints& lit, const uint16_t* wanted,
-                            const DirectionScatter* scatter = nullptr) {
-  const auto with = [&]<Lobes kLobes>() {
-    return Light<kKind, kLobes, kScatter>(light, intensity, falloff, points, first, count, lit, wanted, scatter);
-  };
-  if (points.ggx()) return with.template operator()<Lobes::ggx>();
-  return points.glossy() ? with.template operator()<Lobes::cosine>() : with.template operator()<Lobes::none>();
-}
+};
 
 size_t LightPoints(const Vpl& light, const Rgb& intensity, Falloff falloff, const ShadePoints& points, size_t first,
                    size_t count, LitPoints& lit, const uint16_t* wanted, const DirectionScatter* scatter) {
-  if (scatter != nullptr && light.kind == VplKind::sphere)
-    return LightKind<VplKind::sphere, true>(light, intensity, falloff, points, first, count, lit, wanted, scatter);
-  if (scatter != nullptr)
-    return LightKind<VplKind::oriented, true>(light, intensity, falloff, points, first, count, lit, wanted, scatter);
-  switch (light.kind) {
-    case VplKind::omni:
-      return LightKind<VplKind::omni>(light, intensity, falloff, points, first, count, lit, wanted);
-    case VplKind::oriented:
-      return LightKind<VplKind::oriented>(light, intensity, falloff, points, first, count, lit, wanted);
-    case VplKind::directional:
-      return LightKind<VplKind::directional>(light, intensity, falloff, points, first, count, lit, wanted);
-    case VplKind::spot:
-      return LightKind<VplKind::spot>(light, intensity, falloff, points, first, count, lit, wanted);
-    case VplKind::sphere:
-      return LightKind<VplKind::sphere>(light, intensity, falloff, points, first, count, lit, wanted);
-  }
-  return 0;
+  const Lobes lobes = points.lobes();
+  if (scatter == nullptr)
+    return RunKernel<LightKernel<false>>(light.kind, lobes, light, intensity, falloff, points, first, count, lit, wanted,
+                                         scatter);
+  if (light.kind == VplKind::sphere)
+    return RunForLobes<LightKernel<true>, VplKind::sphere>(lobes, light, intensity, falloff, points, first, count, lit,
+                                                           wanted, scatter);
+  return RunForLobes<LightKernel<true>, VplKind::oriented>(lobes, light, intensity, falloff, points, first, count, lit,
+                                                           wanted, scatter);
 }
 
 Rgb SphereAt(const Vpl& light, const SurfacePoint& point) {
   const D d;
   V3 to_light;
   const V3 position = Set3(d, point.position), normal = Set3(d, point.normal);
-  const V3 f = point.ggx() ? SphereRadiance<Lobes::ggx, true>(d, light, point, 0, position, normal, to_light)
-                           : SphereRadiance<Lobes::cosine, true>(d, light, point, 0, position, normal, to_light);
+  const V3 f = point.lobes() == Lobes::all
+                   ? SphereRadiance<Lobes::all, true>(d, light, point, 0, position, normal, to_light)
+                   : SphereRadiance<Lobes::cosine, true>(d, light, point, 0, position, normal, to_light);
   return {hn::GetLane(f.x), hn::GetLane(f.y), hn::GetLane(f.z)};
 }
 
@@ -142,7 +129,7 @@ Rgb light_point(const Vpl& light, const Rgb& intensity, Falloff falloff, const S
     const Vec3f v = light.position - point.position;
     const float dist2 = std::max(length2(v), 1e-30f);
     to_light = v / std::sqrt(dist2);
-    geometry = 1.0f / std::max(dist2, falloff.clamp2);
+    geometry = 1.0f / std::max(dist2, falloff);
     const float cosine = -dot(light.normal, to_light);
     if (light.kind == VplKind::oriented) geometry *= std::max(0.0f, cosine);
     if (light.kind == VplKind::spot) geometry *= falloff.of_spot(light, -to_light);

@@ -1,11 +1,11 @@
 // Clusters of lights: the dissimilarity of Lightcuts, for the agglomerative core. [Walter et al. 2008, Eq. 2]
-//   d(A, B) = I·(L² + c²·S²)²   of A∪B: summed intensity I, diagonal L of the box of positions, scene diagonal c·16,
-//                               and S, the sine of the half-angle of the cone of directions.
+//   d(A, B) = I·(L² + c²·S²)²
+// of A∪B: I is the summed intensity, L the diagonal of the box of positions, c a sixteenth of the scene's diagonal, and S
+// the sine of the half-angle of the cone of directions.
 // Departs from the paper:
-// - Eq. 2 prints (1-S)², which rewards wide cones and breaks Eq. 1; S² is what the text around it describes.
+// - Eq. 2 prints (1 − S)², which rewards wide cones and breaks Eq. 1. S² is what the text around it describes.
 // - S is the radius of the sphere around the box of unit directions, at most 1: the sine itself for narrow cones. The
-// cone through
-//   that sphere can narrow when the box grows (a test shows it), and Eq. 1 would not hold.
+//   sine of the cone through that sphere can fall when the box grows (a test shows it), and Eq. 1 would not hold.
 // - A light counts with at least a millionth of the mean intensity, so that black lights cluster by place too.
 #pragma once
 

@@ -2,7 +2,7 @@
 // 2006 sec. 3.4]
 #pragma once
 
-#include "bsdf/shade_points.h"
+#include "bsdf/lobes.h"
 #include "clustering/light_tree.h"
 
 namespace lumicut {
@@ -14,15 +14,18 @@ struct alignas(64) PointNodes {
   float normal[3][kLanes], tangent[3][kLanes], bitangent[3][kLanes], normal_cos[kLanes], normal_sin[kLanes];
   float mirror[3][kLanes], mirror_tangent[3][kLanes], mirror_bitangent[3][kLanes], mirror_cos[kLanes],
       mirror_sin[kLanes];
-  float diffuse[3][kLanes], specular[3][kLanes];  // largest of the points, channel by channel
-  float exponent[kLanes];                         // least of Blinn's and Phong's points
-  float schlick[3][kLanes], grazing[3][kLanes];   // F0 and F90: largest of the GGX points, channel by channel
-  float alpha2_low[kLanes], alpha2_high[kLanes];  // least and largest α² of the GGX points
-  float view_cosine[kLanes];                      // least cosine of a GGX point's normal to the viewer
-  float falloff[kLanes];                          // least of all points
-  float radius2[kLanes];                          // squared half diagonal of the box
-  uint32_t used = 0;                              // bits of the lanes that hold points; the others hold copies
-  bool glossy = false, ggx = false;               // any of the points
+  float diffuse[3][kLanes];  // largest of the points, channel by channel
+  float falloff[kLanes];     // least of the points
+  float radius2[kLanes];     // squared half diagonal of the box
+  // What bounds read of the points that have one of the lobes of bsdf/lobes.h.
+  struct OfLobe {
+    float specular[3][kLanes], grazing[3][kLanes];  // largest, channel by channel
+    float shape_low[kLanes], shape_high[kLanes];    // least and largest
+    float view_cosine[kLanes];                      // least cosine of the normal to the viewer
+  } of_lobe[kLobeCount];
+  uint32_t has_lobe = 0;      // bits of the lobes that some point has
+  uint32_t used = 0;          // bits of the lanes that hold points; the others hold copies
+  Lobes lobes = Lobes::none;  // of any of the points
 
   // Lane `lane` becomes the cluster of points [first, first + count) of `points`, count > 0.
   void set(size_t lane, const ShadePoints& points, size_t first, size_t count);

@@ -3,8 +3,8 @@
 // Departs: the paper draws directions at random. Here the diffuse part has a closed form where the whole cone lies
 // above both horizons, and 18 directions elsewhere; lobes are integrated along rays from the mirror direction, whose
 // ends in the cone are known. And the cone opens steadily from the hemisphere at the sphere's surface to all directions
-// at its centre, where the paper jumps to all: no edge is seen. docs/integrators/virtual_spherical_lights.md Compiled
-// once a target: included again by each pass of foreach_target.h.
+// at its centre, where the paper jumps to all: no edge is seen. docs/integrators/virtual_spherical_lights.md
+// Compiled once a target: included again by each pass of foreach_target.h.
 #if defined(LUMICUT_CLUSTERING_SPHERE_INTEGRAL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef LUMICUT_CLUSTERING_SPHERE_INTEGRAL_INL_H_
 #undef LUMICUT_CLUSTERING_SPHERE_INTEGRAL_INL_H_
@@ -124,7 +124,7 @@ HWY_INLINE V MeanOfCosines(D d, const SphereCone& c, const V3& normal, const V3&
 }
 
 // Means over the cone of lobe·cosθx·cosθl: `specular` and `grazing` of LobeSums. Rays leave the mirror direction, in the
-// plane of incidence and across it as GGX's lobe is stretched; along each, places are dense as the lobe is high. The
+// plane of incidence and across it as the lobe is stretched; along each, places are dense as the lobe is high. The
 // sum is divided by the cone's solid angle, or by what the rays make of it where that is more: a mean of values in the
 // cone, so that bounds over the cone hold for it.
 template <Lobes kLobes, bool kCosine>
@@ -132,7 +132,7 @@ HWY_INLINE void MeanOfLobe(D d, const SphereCone& c, const V3& normal, const V3&
                            const LobeShape& shape, V& specular, V& grazing) {
   constexpr int kRays = 6, kPlaces = 3;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), two = hn::Set(d, 2.0f), tiny = hn::Set(d, 1e-20f);
-  const auto is_ggx = shape.is_ggx(d);
+  const LobeExtent extent = ExtentOfLobes<kLobes>(d, shape);
   const V nm = Dot(normal, mirror), cos_half = hn::Sub(one, c.versine);
   // From the mirror direction to the axis.
   const V3 apart{hn::Sub(mirror.x, c.axis.x), hn::Sub(mirror.y, c.axis.y), hn::Sub(mirror.z, c.axis.z)};
@@ -150,7 +150,7 @@ HWY_INLINE void MeanOfLobe(D d, const SphereCone& c, const V3& normal, const V3&
        hn::IfThenElse(upright, hn::Mul(sign, hn::Mul(mirror.y, xk)), hn::Mul(p.y, inverse)),
        hn::IfThenElse(upright, hn::Neg(hn::Mul(sign, mirror.x)), hn::Mul(p.z, inverse))};
   const V3 q = Cross(mirror, p);
-  const V stretch = hn::IfThenElse(is_ggx, hn::Max(nm, hn::Set(d, 0.05f)), one);  // across over along
+  const V stretch = hn::IfThenElse(extent.around_mirror, one, hn::Max(nm, hn::Set(d, 0.05f)));  // across over along
   // Towards the axis.
   V ex = Dot(c.axis, p), ey = Dot(c.axis, q);
   const V e2 = hn::MulAdd(ex, ex, hn::Mul(ey, ey));
@@ -184,8 +184,6 @@ HWY_INLINE void MeanOfLobe(D d, const SphereCone& c, const V3& normal, const V3&
   };
   turn(cos_h, sin_h);
 
-  const V width = hn::IfThenElse(is_ggx, hn::Mul(two, hn::Mul(shape.alpha, shape.alpha)),
-                                 hn::Div(two, hn::Add(one, shape.exponent)));
   V sum = zero, edge = zero, weight = zero;
   for (int ray = 0; ray < kRays; ++ray, turn(cos_step, sin_step)) {
     const V yc = hn::Mul(y, stretch), norm2 = hn::MulAdd(x, x, hn::Mul(yc, yc));
@@ -204,14 +202,15 @@ HWY_INLINE void MeanOfLobe(D d, const SphereCone& c, const V3& normal, const V3&
     const auto whole = hn::And(c.open, hn::Le(reach2, zero));
     from = hn::IfThenElseZero(hn::Not(hn::Or(holds_mirror, whole)), from);
     to = hn::IfThenElse(hn::Or(wraps, whole), two, to);
-    // Not below the horizon of the point, and not behind a cosine lobe.
+    // Not below the horizon of the point, and not behind a lobe round about the mirror direction.
     const V nv = Dot(normal, v);
     const V horizon = hn::Add(one, hn::Div(nv, hn::Sqrt(hn::Max(tiny, hn::MulAdd(nm, nm, hn::Mul(nv, nv))))));
-    to = hn::Min(to, hn::IfThenElse(is_ggx, horizon, hn::Min(horizon, one)));
+    to = hn::Min(to, hn::IfThenElse(extent.around_mirror, hn::Min(horizon, one), horizon));
     const V range = hn::Sub(to, from);
     const auto crosses = hn::Gt(range, zero);
     if (hn::AllFalse(d, crosses)) continue;
-    const V start = hn::Add(from, hn::IfThenElse(is_ggx, hn::Mul(width, norm2), width)), end = hn::Add(start, range);
+    const V width = hn::IfThenElse(extent.around_mirror, extent.width, hn::Mul(extent.width, norm2));
+    const V start = hn::Add(from, width), end = hn::Add(start, range);
     const V share_of_step = hn::Mul(hn::Mul(step, stretch), hn::Set(d, 1.0f / kPlaces));
     const V scale = hn::IfThenElseZero(crosses, hn::Div(hn::Mul(share_of_step, range), norm2));
     for (int place = 0; place < kPlaces; ++place) {
@@ -226,16 +225,13 @@ HWY_INLINE void MeanOfLobe(D d, const SphereCone& c, const V3& normal, const V3&
       const V cos_x = hn::Max(zero, hn::MulAdd(nm, c_b, hn::Mul(nv, s_b)));
       V both = hn::Mul(w, cos_x);
       if constexpr (kCosine) both = hn::Mul(both, hn::Max(zero, Dot(facing, to_light)));
+      const LobeValue value = ValueOfLobes<kLobes, false>(d, shape, {normal, mirror, to_light, cos_x, c_b});
       if constexpr (kLobes == Lobes::cosine) {
-        sum = hn::MulAdd(both, CosineLobe(d, c_b, shape.exponent), sum);
+        sum = hn::MulAdd(both, value.lobe, sum);
       } else {
-        V lobe, fresnel;
-        GgxLobe(d, shape.alpha, cos_x, normal, mirror, to_light, lobe, fresnel);
-        fresnel = hn::IfThenElseZero(is_ggx, fresnel);
-        if (!hn::AllTrue(d, is_ggx)) lobe = hn::IfThenElse(is_ggx, lobe, CosineLobe(d, c_b, shape.exponent));
-        lobe = hn::Mul(lobe, both);
-        sum = hn::MulAdd(lobe, hn::Sub(one, fresnel), sum);
-        edge = hn::MulAdd(lobe, fresnel, edge);
+        const V lobe = hn::Mul(value.lobe, both);
+        sum = hn::MulAdd(lobe, hn::Sub(one, value.fresnel), sum);
+        edge = hn::MulAdd(lobe, value.fresnel, edge);
       }
     }
   }
@@ -259,8 +255,8 @@ HWY_INLINE LobeSums SphereLobes(D d, const Vpl& light, const Points& points, siz
   if constexpr (kCosine) lit = hn::And(lit, RisesAbove(d, cone, Dot(facing, axis)));
   if (hn::AllFalse(d, lit)) return parts;
   V falloff = zero;
-  if constexpr (kLobes == Lobes::ggx) falloff = Load1(d, points.falloff, p);
-  const V even = MeanOfCosines<kLobes == Lobes::ggx, kCosine>(d, cone, normal, facing, falloff);
+  if constexpr (kLobes == Lobes::all) falloff = Load1(d, points.falloff, p);
+  const V even = MeanOfCosines<kLobes == Lobes::all, kCosine>(d, cone, normal, facing, falloff);
   parts.diffuse = hn::IfThenElseZero(lit, hn::Mul(cone.geometry, even));
   if constexpr (kLobes != Lobes::none) {
     const V3 mirror = Load3(d, points.mirror, p);
@@ -294,7 +290,7 @@ HWY_INLINE V3 SphereRadiance(D d, const Vpl& light, const Points& points, size_t
     f = {hn::MulAdd(color.x, part, f.x), hn::MulAdd(color.y, part, f.y), hn::MulAdd(color.z, part, f.z)};
   };
   if constexpr (kLobes != Lobes::none) add(Load3(d, points.specular, p), parts.specular);
-  if constexpr (kLobes == Lobes::ggx) add(Load3(d, points.grazing, p), parts.grazing);
+  if constexpr (kLobes == Lobes::all) add(Load3(d, points.grazing, p), parts.grazing);
   return f;
 }
 

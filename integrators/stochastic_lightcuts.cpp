@@ -214,14 +214,7 @@ class StochasticLightcuts final : public Integrator {
     const float cosine = best_cosine(point.normal);
     if (!(cosine > 0.0f)) return {0.0f, 0.0f};
     float reflected = luminance(point.diffuse);
-    if (const float specular = luminance(point.specular); point.ggx()) {
-      const float nv = dot(point.normal, point.mirror);
-      reflected +=
-          luminance(specular_albedo(point)) * ggx_lobe_bound(point.alpha, nv, cosine, best_cosine(point.mirror));
-    } else if (specular > 0.0f) {
-      const float beta = best_cosine(point.mirror);
-      if (beta > 0.0f) reflected += specular * std::pow(beta, point.exponent);
-    }
+    if (point.lobes() != Lobes::none) reflected += lobe_importance(point, cosine, best_cosine(point.mirror));
     float emitted = 1.0f;
     if ((node.kind == VplKind::oriented || node.kind == VplKind::sphere) && distance > radius) {
       const float c = -dot(node.axis, v) / distance;

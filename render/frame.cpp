@@ -127,7 +127,7 @@ class Batch {
       if (!coat_.empty() && coat_[i]) continue;  // its place has a point of its own
       SurfacePoint point = points_.get(i);
       point.diffuse = Rgb{1, 1, 1} * std::numbers::inv_pi_v<float>, point.specular = point.grazing = {};
-      point.exponent = point.falloff = point.alpha = 0.0f;
+      point.lobe = kCosineLobe, point.shape = point.falloff = 0.0f;
       white.push(point);
     }
     white.finish();

@@ -37,12 +37,11 @@ struct Material {
 
   bool emissive() const { return max_component(emission) > 0.0f; }
   float coat_alpha() const { return coat_roughness * coat_roughness; }
-  bool smooth_coat() const { return coat > 0.0f && coat_alpha() < kLeastAlpha; }
   bool rough_coat() const { return lobe == LobeModel::ggx && coat > 0.0f && coat_alpha() >= kLeastAlpha; }
   // Whether it has a specular lobe somewhere (Bsdf::is_specular); where, a texture of roughness may decide.
   bool may_be_specular() const {
-    return lobe == LobeModel::ggx &&
-           (roughness * roughness < kLeastAlpha || roughness_texture >= 0 || transmission > 0.0f || smooth_coat());
+    return lobe == LobeModel::ggx && (roughness * roughness < kLeastAlpha || roughness_texture >= 0 ||
+                                      transmission > 0.0f || smooth_coat(coat, coat_alpha()));
   }
   bool cutout() const { return opacity < 1.0f || opacity_texture >= 0; }
 };

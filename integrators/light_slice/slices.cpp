@@ -47,9 +47,9 @@ PointFeature point_feature(const ShadePoints& points, size_t i, float length) {
   const SurfacePoint p = points.get(i);
   const Vec3f at = p.position / length, n = p.normal * kNormalScale;
   // How much of the light comes by the mirror: a share of the reflected light, for sharp lobes.
-  const float gloss = p.ggx()             ? luminance(specular_albedo(p))
-                      : p.exponent > 0.0f ? luminance(p.specular) * 6.2831853f / (p.exponent + 2.0f)
-                                          : 0.0f;
+  const float gloss = p.lobe != kCosineLobe ? luminance(specular_albedo(p))
+                      : p.shape > 0.0f      ? luminance(p.specular) * 6.2831853f / (p.shape + 2.0f)
+                                            : 0.0f;
   const float diffuse = luminance(p.diffuse) * 3.1415927f;
   const float share = gloss > 0.0f ? gloss / (gloss + diffuse) : 0.0f;
   const Vec3f m = p.mirror * (kMirrorScale * share);

@@ -9,13 +9,12 @@
 #include "hwy/foreach_target.h"  // compiles this file once a target; before highway.h
 
 #include "clustering/bounds-inl.h"
+#include "clustering/kernel_dispatch-inl.h"
 #include "clustering/light_kernel-inl.h"
 #include "clustering/sphere_integral-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
-
-using DU = hn::RebindToUnsigned<D>;
 
 HWY_INLINE V LuminanceOf(D d, V r, V g, V b) {
   return hn::MulAdd(hn::Set(d, 0.0722f), b, hn::MulAdd(hn::Set(d, 0.7152f), g, hn::Mul(hn::Set(d, 0.2126f), r)));
@@ -28,57 +27,39 @@ HWY_INLINE void Increment(hn::Mask<D> mask, uint32_t* counts) {
 }
 
 // Unshadowed estimates of the points in `active`, and which of them get any.
-template <VplKind kKind, Lobes kLobes>
-HWY_INLINE uint32_t Estimate(const Vpl& light, const Rgb& intensity, Falloff falloff, const PointBlock& block,
-                             uint32_t active, float* r, float* g, float* b) {
-  const D d;
-  uint32_t lit = 0;
-  for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
-    V3 to_light;
-    const V3 normal = Load3(d, block.normal, i);
-    V geometry;
-    V3 f;
-    hn::Mask<D> reached;
-    if constexpr (kKind == VplKind::sphere) {
-      f = SphereRadiance<kLobes, true>(d, light, block, i, Load3(d, block.position, i), normal, to_light);
-      geometry = hn::Set(d, 1.0f), reached = MaskOf(d, active, i);
-    } else {
-      geometry = Geometry<kKind>(d, light, falloff, Load3(d, block.position, i), normal, to_light);
-      reached = hn::And(hn::Gt(geometry, hn::Zero(d)), MaskOf(d, active, i));
-      f = Reflectance<kLobes>(d, block, i, normal, to_light);
+struct EstimateKernel {
+  template <VplKind kKind, Lobes kLobes>
+  static HWY_INLINE uint32_t Run(const Vpl& light, const Rgb& intensity, Falloff falloff, const PointBlock& block,
+                                 uint32_t active, float* r, float* g, float* b) {
+    const D d;
+    uint32_t lit = 0;
+    for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
+      V3 to_light;
+      const V3 normal = Load3(d, block.normal, i);
+      V geometry;
+      V3 f;
+      hn::Mask<D> reached;
+      if constexpr (kKind == VplKind::sphere) {
+        f = SphereRadiance<kLobes, true>(d, light, block, i, Load3(d, block.position, i), normal, to_light);
+        geometry = hn::Set(d, 1.0f), reached = MaskOf(d, active, i);
+      } else {
+        geometry = Geometry<kKind>(d, light, falloff, Load3(d, block.position, i), normal, to_light);
+        reached = hn::And(hn::Gt(geometry, hn::Zero(d)), MaskOf(d, active, i));
+        f = Reflectance<kLobes>(d, block, i, normal, to_light);
+      }
+      const V cr = hn::IfThenElseZero(reached, hn::Mul(hn::Mul(f.x, geometry), hn::Set(d, intensity.x)));
+      const V cg = hn::IfThenElseZero(reached, hn::Mul(hn::Mul(f.y, geometry), hn::Set(d, intensity.y)));
+      const V cb = hn::IfThenElseZero(reached, hn::Mul(hn::Mul(f.z, geometry), hn::Set(d, intensity.z)));
+      hn::Store(cr, d, r + i), hn::Store(cg, d, g + i), hn::Store(cb, d, b + i);
+      lit |= BitsOf(d, hn::Gt(hn::Add(cr, hn::Add(cg, cb)), hn::Zero(d)), i);
     }
-    const V cr = hn::IfThenElseZero(reached, hn::Mul(hn::Mul(f.x, geometry), hn::Set(d, intensity.x)));
-    const V cg = hn::IfThenElseZero(reached, hn::Mul(hn::Mul(f.y, geometry), hn::Set(d, intensity.y)));
-    const V cb = hn::IfThenElseZero(reached, hn::Mul(hn::Mul(f.z, geometry), hn::Set(d, intensity.z)));
-    hn::Store(cr, d, r + i), hn::Store(cg, d, g + i), hn::Store(cb, d, b + i);
-    lit |= BitsOf(d, hn::Gt(hn::Add(cr, hn::Add(cg, cb)), hn::Zero(d)), i);
+    return lit;
   }
-  return lit;
-}
-
-template <VplKind kKind>
-HWY_INLINE uint32_t EstimateOfKind(const Vpl& light, const Rgb& intensity, Falloff falloff, const PointBlock& block,
-                                   uint32_t active, float* r, float* g, float* b) {
-  if (block.ggx) return Estimate<kKind, Lobes::ggx>(light, intensity, falloff, block, active, r, g, b);
-  return block.glossy ? Estimate<kKind, Lobes::cosine>(light, intensity, falloff, block, active, r, g, b)
-                      : Estimate<kKind, Lobes::none>(light, intensity, falloff, block, active, r, g, b);
-}
+};
 
 HWY_NOINLINE uint32_t EstimateOf(const Vpl& light, const Rgb& intensity, Falloff falloff, const PointBlock& block,
                                  uint32_t active, float* r, float* g, float* b) {
-  switch (light.kind) {
-    case VplKind::omni:
-      return EstimateOfKind<VplKind::omni>(light, intensity, falloff, block, active, r, g, b);
-    case VplKind::oriented:
-      return EstimateOfKind<VplKind::oriented>(light, intensity, falloff, block, active, r, g, b);
-    case VplKind::directional:
-      return EstimateOfKind<VplKind::directional>(light, intensity, falloff, block, active, r, g, b);
-    case VplKind::spot:
-      return EstimateOfKind<VplKind::spot>(light, intensity, falloff, block, active, r, g, b);
-    case VplKind::sphere:
-      return EstimateOfKind<VplKind::sphere>(light, intensity, falloff, block, active, r, g, b);
-  }
-  return 0;
+  return RunKernel<EstimateKernel>(light.kind, block.lobes, light, intensity, falloff, block, active, r, g, b);
 }
 
 // Traces the shadow rays of a new representative; what is hidden adds nothing.

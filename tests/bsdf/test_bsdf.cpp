@@ -15,7 +15,7 @@ SurfacePoint point_of(const Rgb& kd, const Rgb& ks, float exponent, const Vec3f&
   p.mirror = normalize(reflect(to_viewer, p.normal));
   p.diffuse = kd * std::numbers::inv_pi_v<float>;
   p.specular = ks * cosine_lobe_scale(false, exponent);
-  p.exponent = exponent;
+  p.shape = exponent;
   return p;
 }
 
@@ -114,7 +114,7 @@ TEST(Bsdf, SamplesFollowTheirDensity) {
       ++cells;
     }
     // Five standard deviations of chi-squared with `cells` degrees of freedom.
-    EXPECT_LT(chi2, cells + 5 * std::sqrt(2.0 * cells)) << "exponent " << p.exponent << " α " << p.alpha;
+    EXPECT_LT(chi2, cells + 5 * std::sqrt(2.0 * cells)) << "lobe " << p.lobe << ", shape " << p.shape;
   }
 }
 

@@ -18,9 +18,10 @@ namespace hn = hwy::HWY_NAMESPACE;
 void ReflectanceOf(const ShadePoints& points, size_t p, const Vec3f& to_light, float* rgb) {
   const D d;
   const V3 normal = Load3(d, points.normal, p), light = Set3(d, to_light);
-  const V3 f = points.ggx()      ? Reflectance<Lobes::ggx>(d, points, p, normal, light)
-               : points.glossy() ? Reflectance<Lobes::cosine>(d, points, p, normal, light)
-                                 : Reflectance<Lobes::none>(d, points, p, normal, light);
+  const Lobes lobes = points.lobes();
+  const V3 f = lobes == Lobes::all      ? Reflectance<Lobes::all>(d, points, p, normal, light)
+               : lobes == Lobes::cosine ? Reflectance<Lobes::cosine>(d, points, p, normal, light)
+                                        : Reflectance<Lobes::none>(d, points, p, normal, light);
   rgb[0] = hn::GetLane(f.x), rgb[1] = hn::GetLane(f.y), rgb[2] = hn::GetLane(f.z);
 }
 
@@ -51,9 +52,9 @@ SurfacePoint random_point(Rng& rng, int kind) {
   if (kind == 0) return p;
   p.specular = color();
   if (kind == 1) {
-    p.exponent = std::pow(1000.0f, rng.next_float());
+    p.shape = std::pow(1000.0f, rng.next_float());
   } else {
-    p.alpha = std::pow(kLeastAlpha, rng.next_float());
+    p.lobe = kLobe<GgxReflection>, p.shape = std::pow(kLeastAlpha, rng.next_float());
     p.grazing = color(), p.falloff = rng.next_float();
   }
   return p;

@@ -18,11 +18,11 @@ inline SurfacePoint random_surface(Rng& rng, float half, bool glossy) {
   if (dot(p.mirror, p.normal) < 0) p.mirror = -p.mirror;
   p.diffuse = {rng.next_float() * 0.3f, rng.next_float() * 0.3f, rng.next_float() * 0.3f};
   if (glossy && rng.next_float() < 0.8f) {
-    p.exponent = std::pow(1000.0f, rng.next_float());
-    p.specular = Rgb{rng.next_float(), rng.next_float(), rng.next_float()} *
-                 cosine_lobe_scale(rng.next_below(2) == 0, p.exponent);
+    p.shape = std::pow(1000.0f, rng.next_float());
+    p.specular =
+        Rgb{rng.next_float(), rng.next_float(), rng.next_float()} * cosine_lobe_scale(rng.next_below(2) == 0, p.shape);
     if (rng.next_below(2) == 0) {
-      p.alpha = std::pow(0.01f, rng.next_float());
+      p.lobe = kLobe<GgxReflection>, p.shape = std::pow(0.01f, rng.next_float());
       p.specular = {rng.next_float(), rng.next_float(), rng.next_float()};
       p.grazing = {rng.next_float(), rng.next_float(), rng.next_float()}, p.falloff = rng.next_float();
     }

@@ -66,10 +66,11 @@ TEST(Bounds, OfGgxAreAboutAsNearAsThoseOfBlinnLobesOfItsWidth) {
           const Vec3f to = normalize(lights[0].position - p.position);
           if (rng.next_below(2) == 0 && dot(to, p.normal) > 0) p.mirror = to;
           if (ggx != 0) {
-            p.specular = {0.5f, 0.5f, 0.5f}, p.grazing = {1, 1, 1}, p.alpha = alpha;
+            p.specular = {0.5f, 0.5f, 0.5f}, p.grazing = {1, 1, 1};
+            p.lobe = kLobe<GgxReflection>, p.shape = alpha;
           } else {
-            p.exponent = 0.5f / (alpha * alpha) - 0.5f;
-            p.specular = Rgb{0.5f, 0.5f, 0.5f} * cosine_lobe_scale(false, p.exponent);
+            p.shape = 0.5f / (alpha * alpha) - 0.5f;
+            p.specular = Rgb{0.5f, 0.5f, 0.5f} * cosine_lobe_scale(false, p.shape);
           }
           points.push(p);
         }

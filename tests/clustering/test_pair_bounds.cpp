@@ -23,7 +23,7 @@ ShadePoints point_cluster(Rng& rng, size_t n, bool glossy) {
     p.normal = normalize(facing + test::random_direction(rng) * turn);
     p.mirror = normalize(shine + test::random_direction(rng) * turn);
     // GGX's points are seen from above their surface.
-    if (const float c = dot(p.normal, p.mirror); p.ggx() && c < 0.01f)
+    if (const float c = dot(p.normal, p.mirror); p.lobe != kCosineLobe && c < 0.01f)
       p.mirror = normalize(p.mirror + p.normal * (0.011f - c));
     points.push(p);
   }

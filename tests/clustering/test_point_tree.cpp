@@ -39,15 +39,17 @@ TEST(PointTree, HoldsEveryPointOnceAndEveryLaneItsPoints) {
         for (int k = 0; k < 3; ++k) {
           ASSERT_LE(std::abs(p.position[k] - block.center[k][lane]), block.half[k][lane] * 1.000001f + 1e-6f);
           ASSERT_LE(p.diffuse[k], block.diffuse[k][lane]);
-          ASSERT_LE(p.specular[k], (p.ggx() ? block.schlick : block.specular)[k][lane]);
-          ASSERT_LE(p.grazing[k], p.ggx() ? block.grazing[k][lane] : 0.0f);
+          ASSERT_LE(p.specular[k], block.of_lobe[p.lobe].specular[k][lane]);
+          ASSERT_LE(p.grazing[k], block.of_lobe[p.lobe].grazing[k][lane]);
           normal_cosine += p.normal[k] * block.normal[k][lane];
         }
         ASSERT_GE(normal_cosine, block.normal_cos[lane] - 1e-5f);
         ASSERT_GE(p.falloff, block.falloff[lane]);
-        if (!p.ggx()) continue;
-        ASSERT_LE(block.alpha2_low[lane], p.alpha * p.alpha);
-        ASSERT_GE(block.alpha2_high[lane], p.alpha * p.alpha);
+        if (!(max_component(p.specular) > 0.0f)) continue;
+        ASSERT_TRUE(block.has_lobe >> p.lobe & 1);
+        ASSERT_LE(block.of_lobe[p.lobe].shape_low[lane], p.shape);
+        ASSERT_GE(block.of_lobe[p.lobe].shape_high[lane], p.shape);
+        ASSERT_LE(block.of_lobe[p.lobe].view_cosine[lane], dot(p.normal, p.mirror));
       }
     };
     check(tree.leaves, 16);

@@ -54,9 +54,9 @@ void place(Rng& rng, Model model, float sharpness, bool inside, SurfacePoint& p,
   if (model == Model::diffuse) {
     p.diffuse = {0.3f, 0.3f, 0.3f};
   } else if (model == Model::ggx) {
-    p.alpha = sharpness, p.specular = {0.3f, 0.3f, 0.3f}, p.grazing = {1, 1, 1};
+    p.lobe = kLobe<GgxReflection>, p.shape = sharpness, p.specular = {0.3f, 0.3f, 0.3f}, p.grazing = {1, 1, 1};
   } else {
-    p.exponent = sharpness, p.specular = Rgb{0.5f, 0.5f, 0.5f} * cosine_lobe_scale(model == Model::phong, sharpness);
+    p.shape = sharpness, p.specular = Rgb{0.5f, 0.5f, 0.5f} * cosine_lobe_scale(model == Model::phong, sharpness);
   }
   light.kind = VplKind::sphere;
   light.intensity = {1, 1, 1};

@@ -49,7 +49,7 @@ TEST(BlockKernel, EqualsThePlainSumForEveryKindAndCount) {
         p.position = test::random_point(rng, 2.0f);
         p.normal = test::random_direction(rng), p.mirror = test::random_direction(rng);
         p.diffuse = {rng.next_float(), rng.next_float(), rng.next_float()};
-        if (glossy) p.specular = {1, 2, 3}, p.exponent = 100.0f * rng.next_float();
+        if (glossy) p.specular = {1, 2, 3}, p.shape = 100.0f * rng.next_float();
         points.push(p);
         plain.push_back(p);
       }

@@ -1,0 +1,44 @@
+// Lamps as virtual lights: how each kind emits. Shared by the files of LightSampler.
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+#include "lights/falloff.h"
+#include "lights/vpl.h"
+#include "scene/light.h"
+
+namespace lumicut {
+
+// Area lamps of spread s emit Lambert times N·max(0, 1 − tanθ·tan a), a = (π−s)/2, whose flux stays that of Lambert.
+// [Cycles; docs/units.md]
+inline Vpl spread_profile(const Light& light) {
+  Vpl v;
+  v.kind = VplKind::spot, v.spot_cosine = 1.0f;
+  const float a = 0.5f * (std::numbers::pi_v<float> - light.spread);
+  v.spread_tan = std::tan(a);
+  v.intensity = Rgb{1, 1, 1} * (2.0f / (2.0f + (2.0f * a - std::numbers::pi_v<float>)*v.spread_tan));
+  return v;
+}
+inline bool narrowed(const Light& light) {
+  return (light.type == LightType::rectangle || light.type == LightType::disk) &&
+         light.spread < std::numbers::pi_v<float> - 1e-4f;
+}
+
+inline Vpl spot_of(const Light& l) {
+  Vpl v;
+  v.kind = VplKind::spot, v.position = l.position, v.normal = l.direction, v.intensity = l.value, v.group = l.group;
+  v.cos_outer() = l.cos_outer, v.blend_cosine = l.blend_cosine, v.spot_cosine = l.spot_cosine ? 1.0f : 0.0f;
+  return v;
+}
+
+// A point lamp with a measured profile.
+inline Vpl profiled(const Light& l, const LightProfile& profile) {
+  Vpl v;
+  v.kind = VplKind::spot, v.position = l.position, v.normal = l.direction, v.intensity = l.value, v.group = l.group;
+  v.profile = l.profile, v.cos_outer() = profile.cos_outer();
+  v.blend_cosine = l.tangent.x, v.spot_cosine = l.tangent.y, v.spread_tan = l.tangent.z;
+  return v;
+}
+
+}  // namespace lumicut

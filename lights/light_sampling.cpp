@@ -1,0 +1,292 @@
+// Draws virtual lights and rays from the emitters that light_sampler.cpp has gathered.
+#include <numbers>
+
+#include "lights/lamp_vpls.h"
+#include "lights/light_sampler.h"
+
+namespace lumicut {
+
+namespace {
+
+// y is drawn first: as arguments of one call, which the compiler may evaluate in either order, they gave another image
+// with another compiler.
+Vec2f random_pair(Rng& rng) {
+  const float y = rng.next_float(), x = rng.next_float();
+  return {x, y};
+}
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+Vec3f uniform_sphere(float u, float v) {
+  const float z = 1.0f - 2.0f * u, r = std::sqrt(std::max(0.0f, 1.0f - z * z)), phi = 2.0f * kPi * v;
+  return {r * std::cos(phi), r * std::sin(phi), z};
+}
+
+// Local frame, z up.
+Vec3f cosine_hemisphere(float u, float v) {
+  const float r = std::sqrt(u), phi = 2.0f * kPi * v;
+  return {r * std::cos(phi), r * std::sin(phi), std::sqrt(std::max(0.0f, 1.0f - u))};
+}
+
+// Uniform in the cone of cosines >= cos_min around z.
+Vec3f uniform_cone(float cos_min, float u, float v) {
+  const float z = 1.0f - u * (1.0f - cos_min), r = std::sqrt(std::max(0.0f, 1.0f - z * z)), phi = 2.0f * kPi * v;
+  return {r * std::cos(phi), r * std::sin(phi), z};
+}
+
+Vpl oriented(const Vec3f& position, const Vec3f& normal, const Rgb& intensity, uint32_t group) {
+  Vpl v;
+  v.position = position, v.kind = VplKind::oriented, v.normal = normal, v.intensity = intensity, v.group = group;
+  return v;
+}
+
+}  // namespace
+
+LightSampler::Surface LightSampler::sample_surface(const Emitter& e, Rng& rng) const {
+  const float u = rng.next_float(), v = rng.next_float();
+  if (e.kind == Kind::triangle) {
+    const Mesh& mesh = scene_.meshes()[e.index];
+    const Material& material = scene_.materials()[mesh.material_of(e.triangle)];
+    RayHit hit;  // a point of the triangle, made whole as any hit is
+    const float s = std::sqrt(u);
+    hit.hit.u = s * (1.0f - v), hit.hit.v = s * v;
+    hit.hit.prim = e.triangle, hit.hit.geom = e.index;
+    hit.hit.inst = scene_.hit_instance(e.index, e.instance);
+    SurfaceHit surface = scene_.surface(hit);
+    const Transform& to_world = scene_.instance(e.index, e.instance);
+    const uint32_t* index = &mesh.indices[3 * size_t{e.triangle}];
+    const Vec3f a = to_world.point(mesh.positions[index[0]]);
+    const float area = 0.5f * length(cross(to_world.point(mesh.positions[index[1]]) - a,
+                                           to_world.point(mesh.positions[index[2]]) - a));
+    float area_pdf = 1.0f / area;
+    if (material.emit_both_sides) {
+      if (rng.next_float() < 0.5f) surface.geometric_normal = -surface.geometric_normal;
+      area_pdf *= 0.5f;
+    }
+    Rgb radiance = scene_.emitted(surface, surface.geometric_normal);
+    if (material.cutout()) radiance *= scene_.opacity(e.index, e.triangle, hit.hit.u, hit.hit.v);  // as rays meet it
+    return {surface.position, surface.geometric_normal, radiance, area_pdf};
+  }
+  const Light& l = scene_.lights()[e.index];
+  if (e.kind == Kind::sphere) {
+    const Vec3f n = uniform_sphere(u, v);
+    const float r2 = l.radius * l.radius;
+    return {l.position + n * l.radius, n, l.value / (kPi * r2), 1.0f / (4.0f * kPi * r2)};
+  }
+  const Vec3f n = cross(l.u, l.v);
+  const float parallelogram = length(n);
+  if (e.kind == Kind::rectangle)
+    return {l.position + l.u * (u - 0.5f) + l.v * (v - 0.5f), n / parallelogram, l.value, 1.0f / parallelogram};
+  const float r = 0.5f * std::sqrt(u), phi = 2.0f * kPi * v;
+  return {l.position + l.u * (r * std::cos(phi)) + l.v * (r * std::sin(phi)), n / parallelogram, l.value,
+          4.0f / (kPi * parallelogram)};
+}
+
+Vec3f LightSampler::sample_environment(double u, double v, Rgb& radiance, float& pdf) const {
+  const Environment& env = scene_.environment();
+  if (env.texture < 0) {
+    radiance = env.color;
+    pdf = 0.25f / kPi;
+    return uniform_sphere(static_cast<float>(u), static_cast<float>(v));
+  }
+  const Texture& t = scene_.textures()[env.texture];
+  // The row by u, the texel within it by v, the place in the texel by what is left of both.
+  double down, along;
+  const size_t y = texels_.sample(u, 0, texels_.size(), down) / t.width();
+  const size_t first = y * t.width(), last = first + t.width();
+  down = std::clamp((texels_.sum(0, first) - u * texels_.total()) / -texels_.sum(first, last), 0.0, 1.0);
+  const size_t i = texels_.sample(v, first, last, along);
+  const double theta = (0.5 - (static_cast<double>(y) + down) / t.height()) * std::numbers::pi;  // elevation
+  const double phi = (0.5 - (static_cast<double>(i - first) + along) / t.width()) * 2 * std::numbers::pi;
+  const Vec3d local{std::cos(theta) * std::cos(phi), std::cos(theta) * std::sin(phi), std::sin(theta)};
+  const Vec3f d{static_cast<float>(local.x), static_cast<float>(local.y), static_cast<float>(local.z)};
+  const float* m = env.world_to_map;  // a rotation: its transpose leads back
+  const Vec3f world = normalize(Vec3f{m[0] * d.x + m[3] * d.y + m[6] * d.z, m[1] * d.x + m[4] * d.y + m[7] * d.z,
+                                      m[2] * d.x + m[5] * d.y + m[8] * d.z});
+  pdf = static_cast<float>(texels_.pmf(i) * static_cast<double>(texels_.size()) /
+                           (2 * std::numbers::pi * std::numbers::pi * std::max(1e-6, std::cos(theta))));
+  radiance = scene_.environment_radiance(world);
+  return world;
+}
+
+Vpl LightSampler::environment_light(uint64_t i, uint64_t count, uint64_t seed) const {
+  Rng rng(seed, Stage::light_path, i, 2), all(seed, Stage::light_path, ~uint64_t{0}, 2);
+  double inverse = 0.0, digit = 0.5;  // van der Corput, base 2
+  for (uint64_t n = i; n != 0; n >>= 1, digit *= 0.5)
+    if ((n & 1) != 0) inverse += digit;
+  // Jittered within their strata, shifted as a whole.
+  const double u = (static_cast<double>(i) + rng.next_float()) / static_cast<double>(count);
+  double v = inverse + all.next_float() + rng.next_float() / static_cast<double>(count);
+  v -= std::floor(v);
+  Rgb radiance;
+  float pdf;
+  Vpl vpl;
+  vpl.kind = VplKind::directional;
+  vpl.normal = -sample_environment(u, v, radiance, pdf);
+  vpl.intensity = radiance / (pdf * static_cast<float>(count));
+  vpl.group = scene_.environment().group;
+  return vpl;
+}
+
+Vec3f LightSampler::sample_sun(const Light& light, Rng& rng) const {
+  if (!(light.radius > 0.0f)) return light.direction;
+  const Vec2f at = random_pair(rng);
+  return Frame(light.direction).to_world(uniform_cone(std::cos(light.radius), at.x, at.y));
+}
+
+Vpl LightSampler::sample_direct(double u, uint64_t count, Rng& rng) const {
+  double rest;
+  const size_t i = power_.sample(u, extended_, sampler_.size(), rest);
+  const Emitter& e = sampler_[i];
+  const auto weight =
+      static_cast<float>(power_.sum(extended_, sampler_.size()) / (power_.sum(i, i + 1) * static_cast<double>(count)));
+  float area_pdf;
+  return extended_light(e, weight, rng, area_pdf);
+}
+
+Vpl LightSampler::extended_light(const Emitter& e, float weight, Rng& rng, float& area_pdf) const {
+  if (e.kind == Kind::sun) {
+    const Light& l = scene_.lights()[e.index];
+    Vpl v;
+    v.kind = VplKind::directional, v.normal = sample_sun(l, rng), v.intensity = l.value * weight, v.group = l.group;
+    area_pdf = 0.0f;
+    return v;
+  }
+  const Surface s = sample_surface(e, rng);
+  area_pdf = s.area_pdf;
+  const uint32_t group = e.kind == Kind::triangle ? scene_.meshes()[e.index].group : scene_.lights()[e.index].group;
+  Vpl v = oriented(s.position, s.normal, s.radiance * (weight / s.area_pdf), group);
+  if (e.kind != Kind::triangle && narrowed(scene_.lights()[e.index])) {
+    const Vpl profile = spread_profile(scene_.lights()[e.index]);
+    v.kind = VplKind::spot, v.spot_cosine = profile.spot_cosine, v.spread_tan = profile.spread_tan;
+    v.intensity = v.intensity * profile.intensity;
+  }
+  return v;
+}
+
+DirectSample LightSampler::sample_light(Rng& rng) const {
+  DirectSample s;
+  const double choice = (static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32;
+  if (choice < environment_share_) {
+    const double u = (static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32, v = rng.next_float();
+    Rgb radiance;
+    float pdf;
+    s.vpl.kind = VplKind::directional;
+    s.vpl.normal = -sample_environment(u, v, radiance, pdf);
+    s.density = environment_share_ * pdf;
+    s.vpl.intensity = radiance / static_cast<float>(s.density);
+    s.vpl.group = scene_.environment().group;
+    s.seen_by_rays = true;
+    return s;
+  }
+  double rest;
+  const double u = (choice - environment_share_) / (1.0 - environment_share_);
+  const size_t i = power_.sample(std::min(u, 1.0 - 0x1p-40), extended_, sampler_.size(), rest);
+  const Emitter& e = sampler_[i];
+  const double share = (1.0 - environment_share_) * power_.sum(i, i + 1) / power_.sum(extended_, sampler_.size());
+  const auto weight = static_cast<float>(1.0 / share);
+  float area_pdf;
+  s.vpl = extended_light(e, weight, rng, area_pdf);
+  s.on_mesh = e.kind == Kind::triangle;
+  s.seen_by_rays = e.kind != Kind::sphere && e.kind != Kind::sun, s.density = share * area_pdf;
+  return s;
+}
+
+Vpl LightSampler::sample_lamp(uint32_t lamp, Rng& rng) const {
+  const Light& l = scene_.lights()[lamp];
+  if (l.type == LightType::spot) return spot_of(l);
+  if (l.type == LightType::point) {
+    if (const LightProfile* profile = l.profile != 0 ? scene_.profiles().find(l.profile) : nullptr) return profiled(l, *profile);
+    if (!(l.radius > 0.0f)) {
+      Vpl v;
+      v.position = l.position, v.intensity = l.value, v.group = l.group;
+      return v;
+    }
+  }
+  const Kind kind =
+      l.type == LightType::point ? Kind::sphere : (l.type == LightType::disk ? Kind::disk : Kind::rectangle);
+  float area_pdf;
+  return extended_light({kind, lamp, 0, 0}, 1.0f, rng, area_pdf);
+}
+
+EmittedRay LightSampler::distant_ray(const Vec3f& travel, const Rgb& irradiance, Rng& rng) const {
+  const float r = scene_.radius() * std::sqrt(rng.next_float()), phi = 2.0f * kPi * rng.next_float();
+  const Frame f(travel);
+  const Vec3f center = scene_.bounds().empty() ? Vec3f{} : scene_.bounds().center();
+  const Vec3f origin =
+      center - travel * (2.0f * scene_.radius()) + f.t * (r * std::cos(phi)) + f.b * (r * std::sin(phi));
+  return {origin, travel, irradiance * (kPi * scene_.radius() * scene_.radius()), 0};
+}
+
+EmittedRay LightSampler::sample_ray(Rng& rng) const {
+  const size_t i = power_.sample((static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32);
+  const Emitter& e = sampler_[i];
+  const auto weight = static_cast<float>(1.0 / power_.pmf(i));
+  EmittedRay ray;
+  switch (e.kind) {
+    case Kind::point: {
+      const Light& l = scene_.lights()[e.index];
+      const Vec2f at = random_pair(rng);
+      ray = {l.position, uniform_sphere(at.x, at.y), l.value * (4.0f * kPi), l.group};
+      break;
+    }
+    case Kind::spot: {
+      const Light& l = scene_.lights()[e.index];
+      const Vec2f at = random_pair(rng);
+      const Vec3f local = uniform_cone(l.cos_outer, at.x, at.y);
+      const float profile = spot_falloff(spot_of(l), local.z);
+      ray = {l.position, Frame(l.direction).to_world(local), l.value * (profile * 2.0f * kPi * (1.0f - l.cos_outer)),
+             l.group};
+      break;
+    }
+    case Kind::profile: {
+      const Light& l = scene_.lights()[e.index];
+      const LightProfile& profile = *scene_.profiles().find(l.profile);
+      const double u = (static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32;
+      const float v = rng.next_float();
+      float vertical, horizontal, pdf;
+      profile.sample(u, v, rng.next_float(), vertical, horizontal, pdf);
+      const Vec3f bitangent = cross(l.tangent, l.direction);
+      const Vec3f direction =
+          normalize(l.direction * std::cos(vertical) +
+                    (l.tangent * std::cos(horizontal) + bitangent * std::sin(horizontal)) * std::sin(vertical));
+      ray = {l.position, direction, l.value * (profile(vertical, horizontal) / pdf), l.group};
+      break;
+    }
+    case Kind::sun: {
+      const Light& l = scene_.lights()[e.index];
+      ray = distant_ray(sample_sun(l, rng), l.value, rng);
+      ray.group = l.group;
+      break;
+    }
+    case Kind::environment: {
+      Rgb radiance;
+      float pdf;
+      const double u = (static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32, v = rng.next_float();
+      const Vec3f towards = sample_environment(u, v, radiance, pdf);
+      ray = distant_ray(-towards, radiance / pdf, rng);
+      ray.group = scene_.environment().group;
+      break;
+    }
+    case Kind::sphere:
+    case Kind::rectangle:
+    case Kind::disk:
+    case Kind::triangle: {
+      const Surface s = sample_surface(e, rng);
+      const Vec2f at = random_pair(rng);
+      const Vec3f local = cosine_hemisphere(at.x, at.y);
+      float factor = kPi / s.area_pdf;
+      if (e.kind != Kind::triangle && narrowed(scene_.lights()[e.index]) && local.z > 0.0f) {
+        const Vpl profile = spread_profile(scene_.lights()[e.index]);
+        factor *= profile.intensity.x * spot_falloff(profile, local.z) / local.z;
+      }
+      const uint32_t group = e.kind == Kind::triangle ? scene_.meshes()[e.index].group : scene_.lights()[e.index].group;
+      ray = {offset(s), Frame(s.normal).to_world(local), s.radiance * factor, group};
+      break;
+    }
+  }
+  ray.flux = ray.flux * weight;
+  return ray;
+}
+
+}  // namespace lumicut
