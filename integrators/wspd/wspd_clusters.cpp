@@ -1,6 +1,7 @@
 // What stands for the lights of a cluster: subgroups by normal, and cubemaps of local visibility.
 #include "core/parallel.h"
 #include "integrators/wspd/wspd_tree.h"
+#include "lights/falloff.h"
 
 namespace lumicut {
 
