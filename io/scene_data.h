@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -60,6 +61,8 @@ struct SceneData {
     for (const auto& mesh : meshes) n += mesh.indices.size() / 3;
     return n;
   }
+  // Of all that emits, as the library tells them apart; one more where the environment is black.
+  std::set<uint32_t> light_groups() const;
 };
 
 // Opacity of what is not there: the ABI reads 0 as "not given".

@@ -22,9 +22,9 @@ namespace {
 
 struct Options : RenderSetup {
   Options() { integrator = kUsualIntegrator; }
-  std::string scene, size;
-  uint32_t samples = 0;
-  bool json = false, no_forecast = false, quiet = false;
+  std::string scene, size, checkpoint;
+  uint32_t samples = 0, passes = 1;
+  bool groups = false, json = false, no_forecast = false, quiet = false;
 };
 
 double bytes_of(const io::SceneData& data) {
@@ -47,6 +47,7 @@ void check_scene(const Options& o) {
   create_device(api, o, device);
   create_scene(api, o, device.get(), scene);
   create_integrator(api, o, device.get(), integrator);
+  check_groups(api, o, o.groups);
   const auto size = o.size.empty() ? std::vector<uint32_t>{} : numbers(o.size, 'x', 2, "--size");
 
   bar.show("reading files", 0, 0);
@@ -58,6 +59,13 @@ void check_scene(const Options& o) {
   desc.width = size.empty() ? data.width : size[0];
   desc.height = size.empty() ? data.height : size[1];
   desc.samples = o.samples > 0 ? o.samples : data.samples;
+  desc.passes = o.passes;
+  if (o.groups) desc.flags |= LUMICUT_GROUPS;
+  if (!o.checkpoint.empty()) {
+    desc.flags |= LUMICUT_CHECKPOINTS;
+    check_room_for_checkpoint(api, o.checkpoint, uint64_t{desc.width} * desc.height,
+                              o.groups ? data.light_groups().size() : 0);
+  }
   bar.show("acceleration structure", 0, 0);
   commit_scene(api, watcher, scene.get(), o.scene);
   // Before the examination, whose own memory is not the render's.
@@ -103,6 +111,12 @@ void add_check(CLI::App& app) {
   add_setup_options(*command, *o);
   command->add_option("--size", o->size, "WIDTHxHEIGHT in pixels (default: the scene's)");
   command->add_option("--spp", o->samples, "Samples a pixel (default: the scene's)")->check(CLI::Range(1, 65536));
+  command->add_option("--passes", o->passes, "Passes that are averaged")
+      ->capture_default_str()
+      ->check(CLI::Range(1u, 1u << 30));
+  command->add_option("--checkpoint", o->checkpoint,
+                      "File that `render` will keep its passes in: is there room for it?");
+  command->add_flag("--groups", o->groups, "One image for each light group too");
   command->add_flag("--no-forecast", o->no_forecast, "Render nothing: no forecast of time and memory");
   command->add_flag("--json", o->json, "Print JSON instead of text");
   command->add_flag("-q,--quiet", o->quiet, "No progress bar");

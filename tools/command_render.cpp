@@ -158,8 +158,7 @@ class RenderCommand {
 
   void create_integrator() {
     create_integrator(integrator_);
-    if (o_.groups && lacks(integrator_info(api(), o_.integrator), LUMICUT_LIGHT_GROUPS))
-      throw UsageError(fmt::format("--groups: {} cannot tell light groups apart", o_.integrator));
+    check_groups(api(), o_, o_.groups);
     if (o_.vpl_in.empty()) return;
     const NothingToLose reading;
     lights_ = io::read_vpls(o_.vpl_in);
@@ -199,22 +198,11 @@ class RenderCommand {
     if (!crop_.empty() &&
         (crop_[0] >= crop_[2] || crop_[1] >= crop_[3] || crop_[2] > desc_.width || crop_[3] > desc_.height))
       throw UsageError(fmt::format("--crop {}: is not a part of {} x {} pixels", o_.crop, desc_.width, desc_.height));
-    check_room_for_checkpoint();
+    // What would fail after the first pass fails before it.
+    if (!o_.checkpoint.empty())
+      check_room_for_checkpoint(api(), o_.checkpoint, pixel_count(), o_.groups ? data.light_groups().size() : 0);
     read_seconds_ = now() - start;
     if (o_.verbosity >= 2) told_ = std::make_unique<io::SceneData>(std::move(data));
-  }
-
-  // What would fail after the first pass fails before it: a folder that is not there, no permission, a full disk.
-  void check_room_for_checkpoint() {
-    if (o_.checkpoint.empty()) return;
-    uint64_t pixel_bytes = 40;  // of the mean's sums; light groups are not known yet
-    for (const auto& channel : choose_channels(api(), "all"))
-      pixel_bytes += 4 * static_cast<uint64_t>(channel.components);
-    try {
-      io::check_writable(o_.checkpoint, pixel_count() * pixel_bytes);
-    } catch (const io::FileError& error) {
-      throw io::FileError(o_.checkpoint, fmt::format("there is no place for a checkpoint: {}", error.what()));
-    }
   }
 
   uint64_t pixel_count() const {

@@ -10,12 +10,13 @@
 namespace lumicut::tools {
 
 struct Forecast {
-  double seconds = 0;          // of `lumicut render`: lights, trees and image, with the threads of the device
-  double prepare_seconds = 0;  // of these: lights and trees, as measured
-  double cpu_seconds = 0;      // of all threads together
-  double rays_per_pixel = 0;   // shadow rays
-  double peak_bytes = 0;       // of the whole process
-  double probed_pixels = 0, pixels = 0, vpls = 0;
+  double seconds = 0;  // all passes of `lumicut render`: lights, trees and image, with the threads of the device
+  double prepare_seconds = 0;   // of these: lights and trees, as measured, for each pass
+  double cpu_seconds = 0;       // of all threads together
+  double rays_per_pixel = 0;    // shadow rays, of all passes together
+  double peak_bytes = 0;        // of the whole process
+  double checkpoint_bytes = 0;  // of a checkpoint's file; while it is replaced, two are on the disk
+  double probed_pixels = 0, pixels = 0, vpls = 0, passes = 1, groups = 0;
 };
 
 // `watch` is told what works now, nullptr at the end: for Ctrl-C. `held_bytes`: what the caller keeps in memory and

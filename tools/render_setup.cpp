@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/atomic_file.h"
 #include "io/file_error.h"
 #include "io/scene_json.h"
 #include "tools/commands.h"
@@ -86,6 +87,11 @@ lumicut_integrator_info integrator_info(const io::Api& api, const std::string& i
   throw UsageError(fmt::format("the library has no integrator \"{}\"", id));
 }
 
+void check_groups(const io::Api& api, const RenderSetup& setup, bool groups) {
+  if (groups && lacks(integrator_info(api, setup.integrator), LUMICUT_LIGHT_GROUPS))
+    throw UsageError(fmt::format("--groups: {} cannot tell light groups apart", setup.integrator));
+}
+
 CLI::Validator number_in(double low, double high) {
   return {[low, high](std::string& text) {
             double value = 0;
@@ -116,6 +122,19 @@ std::vector<uint32_t> numbers(const std::string& text, char separator, size_t co
   if (result.size() != count)
     throw UsageError(fmt::format("{} {}: {} numbers instead of {}", option, text, result.size(), count));
   return result;
+}
+
+uint64_t checkpoint_pixel_bytes(const io::Api& api, size_t groups) {
+  constexpr uint64_t kSums = 40;  // of the mean
+  uint64_t components = 3 * groups;
+  for (const auto& channel : api::channels(api)) components += channel.components;
+  return kSums + sizeof(float) * components;
+}
+
+void check_room_for_checkpoint(const io::Api& api, const std::string& path, uint64_t pixels, size_t groups) try {
+  io::check_writable(path, pixels * checkpoint_pixel_bytes(api, groups));
+} catch (const io::FileError& error) {
+  throw io::FileError(path, fmt::format("there is no place for a checkpoint: {}", error.what()));
 }
 
 std::vector<lumicut_tile> choose_squares(uint32_t width, uint32_t height, uint32_t count) {

@@ -56,6 +56,9 @@ inline bool lacks(const lumicut_integrator_info& info, uint32_t trait) {
   return info.traits != 0 && (info.traits & trait) == 0;
 }
 
+// Throws UsageError where light groups are asked for and the integrator cannot tell them apart.
+void check_groups(const io::Api& api, const RenderSetup& setup, bool groups);
+
 // For options of numbers: from `low` to `high`, and no NaN (which CLI::Range lets pass).
 CLI::Validator number_in(double low, double high);
 
@@ -63,6 +66,12 @@ CLI::Validator number_in(double low, double high);
 std::vector<uint32_t> image_size(const std::string& text);
 // "512x384" -> {512, 384}; "a,b,c,d" with ','. Throws UsageError.
 std::vector<uint32_t> numbers(const std::string& text, char separator, size_t count, const char* option);
+
+// Of a checkpoint: the mean's sums, every channel, and the radiance of so many light groups.
+uint64_t checkpoint_pixel_bytes(const io::Api& api, size_t groups);
+// Throws FileError where a checkpoint of so many pixels has no place: a folder that is not there, no permission, a full
+// disk.
+void check_room_for_checkpoint(const io::Api& api, const std::string& path, uint64_t pixels, size_t groups);
 
 // `count` squares of 32 pixels (less at the edges), spread evenly over the frame whatever their number; all of it when
 // there are no more. [Roberts 2018, R2 sequence]

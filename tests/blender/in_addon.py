@@ -222,7 +222,7 @@ class ManyRenders(unittest.TestCase):
 
         sizes = []
         with h.quiet():
-            h.set_lumicut("illumination_cut", vpls=2000)
+            h.set_lumicut("illumination_cut", vpls=300)
             for _ in range(50):
                 bpy.ops.render.render()
                 sizes.append(resident())

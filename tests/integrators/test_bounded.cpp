@@ -210,5 +210,84 @@ TEST_P(InstancedScenes, EndOnEmbreeToo) {
   }
 }
 
+// A room of metals from smooth to rough, some of them instances, under a lamp of 50 kW: one that is alone, or beside a
+// lamp of 1 W and a strong sun through the open side. What is bright there is 10^4 times what is dim, and lobes are narrow.
+std::unique_ptr<Scene> metal_room(const char* accel, bool more_lamps) {
+  auto scene = std::make_unique<Scene>(Scene::Config{accel, true, ""});
+  std::vector<Material> materials = {test::diffuse(0.7f, 0.7f, 0.7f)};
+  for (int i = 1; i <= 9; ++i) {
+    Material metal = test::diffuse(0.9f, 0.7f, 0.4f);
+    metal.lobe = LobeModel::ggx;
+    metal.specular = {1, 1, 1}, metal.metallic = 1.0f, metal.roughness = 0.1f * static_cast<float>(i);
+    materials.push_back(metal);
+  }
+  scene->set_materials(std::move(materials));
+  Mesh room;
+  test::add_box(room, {-2, 0, -2}, {2, 3, 2}, 0, true);
+  if (more_lamps) room.indices.resize(room.indices.size() - 6), room.triangle_materials.resize(room.indices.size() / 3);
+  test::add_quad(room, {-2, 0.001f, 2}, {2, 0.001f, 2}, {2, 0.001f, -2}, {-2, 0.001f, -2}, 4);
+  scene->add_mesh(std::move(room));
+  Rng rng(5, Stage::test);
+  for (uint32_t i = 1; i <= 9; ++i) {
+    Mesh box;
+    test::add_box(box, {-0.2f, -0.2f, -0.2f}, {0.2f, 0.2f, 0.2f}, i, false);
+    for (int copy = 0; copy < 4; ++copy) {
+      Transform t;
+      for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column) t.m[4 * row + column] += 0.4f * (rng.next_float() - 0.5f);
+      const Vec3f at = test::random_point(rng, 1.6f);
+      t.m[3] = at.x, t.m[7] = 1.5f + 0.7f * at.y, t.m[11] = at.z;
+      box.instances.push_back(t);
+    }
+    scene->add_mesh(std::move(box));
+  }
+  constexpr float kSphere = 4.0f * 3.14159265f;
+  Light strong, dim, sun;
+  strong.position = {0.3f, 2.5f, 0.2f}, strong.value = Rgb{1, 1, 1} * (50000.0f / kSphere);
+  dim.position = {-1.5f, 0.5f, 1.5f}, dim.value = Rgb{1, 1, 1} * (1.0f / kSphere);
+  sun.type = LightType::sun, sun.direction = normalize(Vec3f{-1, -0.5f, 0.2f}), sun.value = {1000, 1000, 1000};
+  scene->set_lights(more_lamps ? std::vector<Light>{strong, dim, sun} : std::vector<Light>{strong});
+  Camera camera;
+  camera.position = {0, 1.6f, 1.9f};
+  camera.right = {1, 0, 0}, camera.forward = normalize(Vec3f{0, -0.1f, -1});
+  camera.up = cross(camera.right, camera.forward);
+  scene->set_camera(camera);
+  Progress progress;
+  scene->commit(progress);
+  return scene;
+}
+
+class Work : public testing::TestWithParam<const char*> {};
+
+INSTANTIATE_TEST_SUITE_P(Registry, Work, testing::ValuesIn(ids()),
+                         [](const auto& entry) { return std::string(entry.param); });
+
+// Exhaustive sums each light at each point: one term and one ray. At worst, a method that clusters lights looks at all
+// nodes of its tree, twice as many as lights, and sums all lights: four steps where exhaustive has two.
+TEST_P(Work, IsAtMostTwiceThatOfSummingAllLights) {
+  if (find_integrator(GetParam())->light_source != LightSource::virtual_lights)
+    GTEST_SKIP() << "it has no virtual lights";
+  for (const char* accel : {"bvh", "embree"})
+    for (const bool more_lamps : {false, true}) {
+      const auto scene = metal_room(accel, more_lamps);
+      const VplSet vpls = test::lights_of(*scene, 2000);
+      for (const bool heavy : {false, true}) {
+        // Of the methods that sample, the heavy settings are a number of samples that the user asks for.
+        const bool sampling = std::string(GetParam()) == "stochastic_lightcuts" ||
+                              std::string(GetParam()) == "light_slice" ||
+                              std::string(GetParam()) == "row_column_sampling";
+        if (heavy && sampling) continue;
+        const test::Settings settings = heavy ? heavy_settings(GetParam()) : test::Settings{};
+        const Counters c = test::render(*scene, GetParam(), vpls, settings, 40, 30).counters;
+        const double pairs = static_cast<double>(c.points) * static_cast<double>(vpls.lights.size());
+        const double work = static_cast<double>(c.rays + c.bounds + c.clusters) / (2.0 * pairs);
+        std::printf("%s, %s lamps, %s: %.4f of exhaustive's\n", accel, more_lamps ? "three" : "one",
+                    heavy ? "no error" : "as it comes", work);
+        EXPECT_GT(work, 0.0);
+        EXPECT_LE(work, 2.0);
+      }
+    }
+}
+
 }  // namespace
 }  // namespace lumicut

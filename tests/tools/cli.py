@@ -48,7 +48,7 @@ def together(calls):
 
 
 def wait_until_busy(process, seconds):
-    """Until the process has used so much processor time: loading libraries alone takes less."""
+    """Until the process has used so much processor time: loading libraries alone takes a tenth of a second at most."""
     tick, limit = os.sysconf("SC_CLK_TCK"), time.monotonic() + 60
     while process.poll() is None and time.monotonic() < limit:
         fields = pathlib.Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()

@@ -217,7 +217,7 @@ class Failures(Bench):
                                    stderr=subprocess.PIPE, text=True)
         line = process.stderr.readline()
         self.assertIn(name, line)
-        time.sleep(1)
+        time.sleep(0.4)
         self.assertIsNone(process.poll(), "long enough to be interrupted")
         process.send_signal(signal.SIGINT)
         text = process.communicate(timeout=60)[1]

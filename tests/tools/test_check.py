@@ -178,6 +178,12 @@ class Check(Base):
         quiet = lumicut("render", scene, "--vpls", "100", "--stats", self.folder / "s.json")
         self.assertNotIn("zero_power_light", quiet.stderr)
 
+    def test_what_render_would_refuse_is_refused(self):
+        nowhere = self.folder / "none/kept"
+        self.assert_ends(lumicut("check", self.scene(), "--checkpoint", nowhere), BAD_FILE, "no place for a checkpoint", "none")
+        self.assert_ends(lumicut("check", self.scene(), "--groups", "-i", "path_tracer"), USAGE, "--groups", "path_tracer")
+        self.assert_ends(lumicut("check", self.scene(), "--passes", "0"), USAGE, "--passes")
+
 
 class Forecast(Base):
     """By CPU seconds, rays and bytes: the clock on the wall depends on what else the machine does."""
@@ -193,21 +199,43 @@ class Forecast(Base):
         measured["cpu"] = usage.ru_utime + usage.ru_stime
         return measured
 
+    def assert_holds(self, name, *arguments):
+        result = lumicut("check", *arguments, "--json")
+        self.assert_ends(result, OK)
+        forecast = json.loads(result.stdout)["forecast"]
+        measured = self.render(*arguments)
+        reading = measured["phases"]["reading files"] + measured["phases"]["acceleration structure"]
+        for what, foretold, found in (("rays", forecast["rays_per_pixel"], measured["rays_per_pixel"]),
+                                      ("bytes", forecast["peak_bytes"], measured["peak_bytes"]),
+                                      ("cpu", forecast["cpu_seconds"] + reading, measured["cpu"])):
+            self.assertLess(foretold / found, 2, f"{name}: {what}")
+            self.assertGreater(foretold / found, 0.5, f"{name}: {what}")
+        return forecast, measured
+
     def test_time_rays_and_memory_are_within_a_factor_of_two(self):
         # Much longer than loading the libraries and writing the image, which the forecast leaves out.
         for name, arguments in (("cornell_box", ("--size", "448x448", "--vpls", "20000")),
                                 ("indirect_room", ("--size", "192x144", "--vpls", "12000", "-i", "exhaustive"))):
-            arguments = (str(ROOT / f"reference_images/{name}/{name}.json"), "--spp", "1", *arguments)
-            result = lumicut("check", *arguments, "--json")
-            self.assert_ends(result, OK)
-            forecast = json.loads(result.stdout)["forecast"]
-            measured = self.render(*arguments)
-            reading = measured["phases"]["reading files"] + measured["phases"]["acceleration structure"]
-            for what, foretold, found in (("rays", forecast["rays_per_pixel"], measured["rays_per_pixel"]),
-                                          ("bytes", forecast["peak_bytes"], measured["peak_bytes"]),
-                                          ("cpu", forecast["cpu_seconds"] + reading, measured["cpu"])):
-                self.assertLess(foretold / found, 2, f"{name}: {what}")
-                self.assertGreater(foretold / found, 0.5, f"{name}: {what}")
+            self.assert_holds(name, str(ROOT / f"reference_images/{name}/{name}.json"), "--spp", "1", *arguments)
+
+    def test_of_passes_light_groups_and_checkpoints_too(self):
+        scene = json.loads((ROOT / "reference_images/cornell_box/cornell_box.json").read_text())
+        for mesh in scene["meshes"]:
+            mesh["obj"] = str(ROOT / "reference_images/cornell_box" / mesh["obj"])
+        lamp = {"type": "point", "position": [0.5, 0.5, 0.5], "value": 1}
+        scene["lights"] = [{**lamp, "group": 1}, {**lamp, "position": [0.2, 0.5, 0.5], "group": 2}]
+        path, kept = self.folder / "groups.json", self.folder / "kept"
+        path.write_text(json.dumps(scene))
+        # So large that films, not libraries, are most of the memory: 6 passes of few lights.
+        words = [path, "--spp", "1", "--size", "448x448", "--vpls", "600", "-p", "error=0.1", "--passes", "6", "--groups", "--checkpoint", kept]
+        forecast, measured = self.assert_holds("passes", *map(str, words))
+        self.assertEqual((forecast["passes"], measured["values"]["passes"]), (6, 6))
+        # All but the header and the key, a description of the scene.
+        self.assertAlmostEqual(forecast["checkpoint_bytes"] / kept.stat().st_size, 1, delta=0.01)
+        self.assertGreater(forecast["peak_bytes"], measured["values"]["estimated_bytes"])
+        text = lumicut("check", *words).stdout
+        self.assertIn("6 passes", text)
+        self.assertIn("a checkpoint of", text)
 
 
 if __name__ == "__main__":

@@ -153,7 +153,7 @@ class Render(Cli):
         self.assert_ends(lumicut("compare", image, image, "--layer", "normal"), BAD_FILE, "normal", "depth")
 
     def test_an_interrupt_leaves_no_file(self):
-        for code, wait in ((signal.SIGINT, 1.0), (signal.SIGTERM, 2.5)):
+        for code, wait in ((signal.SIGINT, 0.2), (signal.SIGTERM, 0.8)):
             names = [x for option, name in (("-o", "a.exr"), ("--png", "a.png"), ("--stats", "a.json")) for x in (option, self.folder / name)]
             process = subprocess.Popen([COMMAND, "render", SCENE, "-i", "exhaustive", "--vpls", "500000", "--size", "2000x2000", *names],
                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

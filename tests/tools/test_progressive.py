@@ -103,6 +103,17 @@ class Progressive(Compared):
         self.assert_ends(full, BAD_FILE, "a.checkpoint", "no place for a checkpoint", "cannot be written")
         self.assertEqual(self.files(), [])
 
+    def test_room_for_light_groups_is_asked_for_too(self):
+        scene = self.folder / "groups.json"
+        scene.write_text(json.dumps(Mix.SCENE))
+        kept = self.folder / "a.checkpoint"
+        # 48x48 pixels of 116 bytes are 267,264, and of two groups 55,296 more.
+        for groups, code in (([], OK), (["--groups"], BAD_FILE)):
+            result = subprocess.run([COMMAND, "render", scene, *SMALL, *groups, "--checkpoint", kept, "-o", self.folder / "a.exr", "--layers",
+                                     "radiance"], capture_output=True, text=True, timeout=300, restore_signals=False,
+                                    preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (300000, 300000)))
+            self.assert_ends(result, code, *(["no place for a checkpoint"] if groups else []))
+
     def test_a_checkpoint_that_fails_later_costs_no_image(self):
         image, folder = self.folder / "a.exr", self.folder / "folder"
         folder.mkdir()
