@@ -12,11 +12,11 @@ bl_info = {
 
 if "bpy" in locals():  # reloaded by the host: its parts, too, from the bottom up
     import importlib
-    for _part in (library, report, scene_data, nodes, materials, ies, sky, lights, collect, runtime, properties, export,  # noqa: F821
+    for _part in (library, report, scene_data, images, nodes, materials, ies, sky, lights, collect, runtime, properties, export,  # noqa: F821
                   viewport, engine, preferences, panels):  # noqa: F821
         importlib.reload(_part)
 else:
-    from . import (collect, engine, export, ies, library, lights, materials, nodes, panels, preferences, properties,  # noqa: F401
+    from . import (collect, engine, export, ies, images, library, lights, materials, nodes, panels, preferences, properties,  # noqa: F401
                    report, runtime, scene_data, sky, viewport)
 
 import bpy  # noqa: E402, F401

@@ -196,6 +196,7 @@ class Collector:
         self.depsgraph, self.check, self.cache, self.bake = depsgraph, check, cache, bake
         self.report = report if report is not None else Report()
         self.materials = Materials(self.report, max_shininess, images, check)
+        self.materials.images.frame = depsgraph.scene_eval.frame_current
         self.scene = SceneData()
         self.profiles = lights.Profiles(self.report)
         self._meshes = {}

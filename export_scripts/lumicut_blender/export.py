@@ -64,7 +64,7 @@ def exr(pixels):
 
 def linear(image):
     """An image's texels as linear float32."""
-    from .nodes import srgb_to_linear
+    from .images import srgb_to_linear
     if image.pixels.dtype != np.uint8:
         return image.pixels
     table = np.arange(256, dtype=np.float32) / 255

@@ -8,7 +8,8 @@ import numpy as np
 from mathutils import Euler
 
 from . import ies, library, sky
-from .nodes import Evaluator, Mapping, Picture, Value
+from .images import Picture
+from .nodes import Evaluator, Mapping, Value
 from .report import Report
 from .scene_data import Profile
 
@@ -343,7 +344,7 @@ class WorldReader(Directions):
         if node.image is None:
             self.note(node.name, "Image textures without an image, taken as black")
             return Value(0)
-        read = self.images.pixels(node.image)
+        read = self.images.pixels(node.image, node.image_user)
         if read is None:
             return Value((1, 0, 1))
         if node.projection != "EQUIRECTANGULAR":
@@ -360,7 +361,7 @@ class WorldReader(Directions):
             texels, srgb = read
             return texels[..., :3] if texels.dtype == np.uint8 else np.maximum(texels[..., :3], 0), srgb
 
-        return Value(1, Picture(node.image.name, (node.image.name_full, "sky"), Mapping(), 0, stored=stored))
+        return Value(1, Picture(node.image.name, (self.images.key(node.image, node.image_user), "sky"), Mapping(), 0, stored=stored))
 
     def _tex_sky(self, node, output, stack):
         self.note(f"Sky Texture ({node.sky_type.lower()})", "Procedural skies taken as an even pale blue")

@@ -11,7 +11,8 @@ import bpy
 import numpy as np
 
 from . import library
-from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Images, Mapping, Picture, Value, image_of, input_of
+from .images import Images, Picture, image_of
+from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Mapping, Value, input_of
 
 HOLE = 1e-3  # an opacity that the library takes as "not there"; 0 means 1 to it
 

@@ -8,14 +8,9 @@ import math
 import numpy as np
 
 from . import library
-from .scene_data import Image
+from .images import Picture
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
-LINEAR_SPACES = {"Non-Color", "Raw", "Linear", "Linear Rec.709", "scene_linear"}
-
-
-def srgb_to_linear(x):
-    return np.where(x <= 0.04045, x / 12.92, ((np.maximum(x, 0) + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 class Mapping:
@@ -33,36 +28,6 @@ class Mapping:
 
     def is_plain(self):
         return self.key == ("UV", "", ((1, 0, 0), (0, 1, 0)))
-
-
-class Picture:
-    """An image with its mapping. stored(): (texels as they are, flags). linear(): (h, w, 3) float32."""
-
-    def __init__(self, name, key, mapping, flags, stored=None, linear=None):
-        self.name, self.key, self.mapping, self.flags = name, key, mapping, flags
-        self._stored, self._linear = stored, linear
-
-    def stored(self):
-        if self._stored is not None:
-            pixels, srgb = self._stored()
-            return np.ascontiguousarray(pixels), self.flags | (library.SRGB if srgb else 0)
-        return np.ascontiguousarray(self._linear, np.float32), self.flags
-
-    def is_byte(self):
-        return self._stored is not None and self._stored()[0].dtype == np.uint8
-
-    def is_grey(self):
-        texels = self._stored()[0] if self._stored is not None else self._linear
-        return texels.shape[2] == 1 or (texels[..., :1] == texels[..., 1:3]).all()
-
-    def linear(self):
-        if self._linear is None:
-            pixels, srgb = self._stored()
-            if pixels.dtype == np.uint8:
-                table = np.arange(256, dtype=np.float32) / 255
-                pixels = (srgb_to_linear(table) if srgb else table)[pixels]
-            self._linear = np.broadcast_to(pixels, pixels.shape[:2] + (3,)).astype(np.float32)
-        return self._linear
 
 
 class Value:
@@ -88,64 +53,6 @@ class Value:
 
 
 ZERO, ONE = Value(0), Value(1)
-
-
-SLAB = 1 << 22  # numbers between two looks at the stop button
-
-
-class Images:
-    """Texels of Blender's images, read once: packed, generated, byte and float alike.
-
-    `check` is called between steps of what takes long, and raises to stop.
-    """
-
-    def __init__(self, report, check=lambda: None):
-        self.report, self.check = report, check
-        self._read = {}
-
-    def pixels(self, image):
-        """((h, w, 4) texels top row first as stored, whether they are sRGB), or None where there is no picture."""
-        if image.name_full in self._read:
-            return self._read[image.name_full]
-        width, height = image.size
-        result = None
-        self.check()
-        if width > 0 and height > 0 and image.channels > 0:
-            flat = np.empty(width * height * image.channels, np.float32)
-            try:
-                image.pixels.foreach_get(flat)
-                texels = flat.reshape(height, width, image.channels)[::-1]
-                if image.channels < 3:  # grey, grey and alpha
-                    alpha = texels[..., 1:] if image.channels == 2 else np.ones_like(texels)
-                    texels = np.concatenate([np.repeat(texels[..., :1], 3, 2), alpha], 2)
-                elif image.channels == 3:
-                    texels = np.concatenate([texels, np.ones_like(texels[..., :1])], 2)
-                srgb = False
-                if image.is_float:
-                    texels = np.ascontiguousarray(np.nan_to_num(texels, nan=0, posinf=65504, neginf=0))
-                else:
-                    texels = self._bytes(texels)
-                    space = image.colorspace_settings.name
-                    srgb = space not in LINEAR_SPACES
-                    if srgb and space != "sRGB":
-                        self.report.note(f"{image.name} ({space})", "Colour spaces of images taken as sRGB")
-                result = texels, srgb
-            except RuntimeError:
-                result = None
-        if result is None:
-            self.report.note(image.name, "Images without data, shown pink")
-        if image.source in {"SEQUENCE", "MOVIE", "TILED"}:
-            self.report.note(f"{image.name} ({image.source.lower()})", "Images of which the first picture or tile is used")
-        self._read[image.name_full] = result
-        return result
-
-    def _bytes(self, texels):
-        out = np.empty(texels.shape, np.uint8)
-        rows = max(1, SLAB // (texels.shape[1] * texels.shape[2]))
-        for row in range(0, len(texels), rows):
-            self.check()
-            out[row:row + rows] = np.rint(np.clip(texels[row:row + rows], 0, 1) * 255)
-        return out
 
 
 def input_of(node, *names):
@@ -189,6 +96,31 @@ def _hsv(rgb):
 def _rgb(h, s, v):
     k = (np.stack([5 + h * 6, 3 + h * 6, 1 + h * 6], -1)) % 6
     return v[..., None] - (v * s)[..., None] * np.clip(np.minimum(k, 4 - k), 0, 1)
+
+
+def curve_tables(mapping, count):
+    """The first curves of a mapping as functions of arrays, from 256 values as Cycles has them."""
+    mapping.initialize()
+    curves = [mapping.curves[k] for k in range(count)]
+    places = [point.location[0] for curve in curves for point in curve.points]
+    low, high = min(places), max(places)
+    if not high > low:
+        low, high = 0.0, 1.0
+    at = np.linspace(low, high, 256)
+
+    def function(curve):
+        values = np.array([mapping.evaluate(curve, x) for x in at])
+
+        def looked_up(x):
+            y = np.interp(x, at, values)
+            if mapping.extend == "EXTRAPOLATED":
+                y = y + np.minimum(0, x - low) * (values[1] - values[0]) / (at[1] - at[0])
+                y = y + np.maximum(0, x - high) * (values[-1] - values[-2]) / (at[-1] - at[-2])
+            return y
+
+        return looked_up
+
+    return [function(curve) for curve in curves]
 
 
 def blackbody(kelvin):
@@ -419,6 +351,20 @@ class Evaluator:
 
         return self.apply("ramp", lookup, self.value(node.inputs[0], stack))
 
+    def _curve_rgb(self, node, output, stack):
+        tables = curve_tables(node.mapping, 4)
+
+        def curved(f, c):
+            whole = np.stack([tables[k](tables[3](c[..., k])) for k in range(3)], -1)
+            return c + f * (whole - c)
+
+        return self.apply("curves", curved, *(self.value(node.inputs[i], stack) for i in range(2)))
+
+    def _curve_float(self, node, output, stack):
+        table, = curve_tables(node.mapping, 1)
+        return self.apply("curve", lambda f, c: c + f * (table(c) - c), self.value(node.inputs[0], stack),
+                          self.grey(self.value(node.inputs[1], stack)))
+
     def _clamp(self, node, output, stack):
         values = [self.value(node.inputs[i], stack) for i in range(3)]
         return self.apply("clamp", lambda v, lo, hi: np.clip(v, lo, hi), *values)
@@ -535,30 +481,29 @@ class Evaluator:
             self.note(node.name, "Image textures without an image, taken as black")
             return ZERO
         alpha = output.name == "Alpha"
-        read = self.images.pixels(image)
+        user = getattr(node, "image_user", None)
+        read = self.images.pixels(image, user)
         if read is None:
             return Value(1) if alpha else Value((1, 0, 1))
+        if alpha and (image.alpha_mode == "NONE" or (read[0][..., 3] == (255 if read[0].dtype == np.uint8 else 1.0)).all()):
+            return ONE
         mapping = self.mapping(node.inputs["Vector"], stack)
         if mapping is None or node.projection != "FLAT":
             self.note(image.name, "Textures on coordinates other than UV and Generated, taken as their mean")
         flags = {"EXTEND": library.CLAMP, "CLIP": library.CLAMP}.get(node.extension, 0)
-        if node.extension in {"CLIP", "MIRROR"}:
+        columns, rows = self.images.grid(image)
+        if columns * rows > 1:
+            flags = library.CLAMP
+            if mapping is not None:
+                mapping = Mapping(mapping.source, mapping.uv_map, np.array([[1 / columns], [1 / rows]]) * mapping.matrix)
+        elif node.extension in {"CLIP", "MIRROR"}:
             self.note(f"{image.name}: {node.extension.lower()}", "Extensions of images taken as repeat or extend")
         if node.interpolation == "Closest":
             flags |= library.NEAREST
-
-        def stored():
-            texels, srgb = read
-            return (texels[..., 3:4], False) if alpha else (texels[..., :3], srgb)
-
-        picture = Picture(image.name, (image.name_full, alpha, flags), mapping or Mapping(), flags, stored=stored)
+        divided = node.outputs["Alpha"].is_linked
+        texels = read[0][..., 3:4] if alpha else self.images.colours(image, user, divided)
+        key = (self.images.key(image, user), "alpha" if alpha else divided, flags)
+        picture = Picture(image.name, key, mapping or Mapping(), flags, stored=lambda: (texels, read[1] and not alpha))
         if mapping is None or node.projection != "FLAT":
             return Value(picture.linear().mean((0, 1)))
-        if alpha and (read[0][..., 3] == (255 if read[0].dtype == np.uint8 else 1.0)).all():
-            return ONE
         return Value(1, picture)
-
-
-def image_of(picture):
-    pixels, flags = picture.stored()
-    return Image(picture.name, pixels, flags)

@@ -14,7 +14,7 @@ import numpy as np
 from gpu_extras.presets import draw_texture_2d
 
 from . import collect, library, properties, runtime, sky
-from .nodes import Images
+from .images import Images
 from .report import Report
 
 # (pixels of the view a pixel of the picture, quality that the library suggests an integrator for or None for the scene's own)

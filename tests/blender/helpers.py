@@ -12,8 +12,9 @@ ROOT = pathlib.Path(os.environ["LUMICUT_SOURCE_DIR"])
 VERSION = bpy.app.version
 
 
-def read_exr(path):
-    """{layer name ("Combined", "Depth" ...): (h, w, channels) float32, top row first} of an uncompressed 32-bit EXR."""
+def read_exr(path, layer=None):
+    """{pass name ("Combined", "Depth" ...): (h, w, channels) float32, top row first} of an uncompressed 32-bit EXR.
+    `layer`: of that view layer alone."""
     raw = pathlib.Path(path).read_bytes()
     assert raw[:4] == b"\x76\x2f\x31\x01", f"{path} is no EXR"
     at, attributes = 8, {}
@@ -53,6 +54,8 @@ def read_exr(path):
     layers = {}
     for name, plane in planes.items():
         parts = name.split(".")
+        if layer is not None and parts[0] != layer:
+            continue
         layers.setdefault(parts[-2] if len(parts) > 1 else "Combined", {})[parts[-1]] = plane
     order = "RGBAXYZV"
     return {name: np.stack([found[c] for c in sorted(found, key=order.find)], -1) for name, found in layers.items()}
@@ -185,17 +188,27 @@ def set_cycles(samples=64, bounces=0):
     c.seed = 1
 
 
-def render(animation=False):
-    """All layers of the scene's render, through a multi-layer EXR."""
+def render(layer=None):
+    """All passes of the scene's render, or of one of its layers, through a multi-layer EXR."""
     scene = bpy.context.scene
     image = scene.render.image_settings
     if hasattr(image, "media_type"):
         image.media_type = "MULTI_LAYER_IMAGE"
     image.file_format, image.color_depth, image.exr_codec = "OPEN_EXR_MULTILAYER", "32", "NONE"
+    image.views_format = "MULTIVIEW"  # both eyes in one file
     with tempfile.TemporaryDirectory() as folder:
         scene.render.filepath = folder + "/image.exr"
         bpy.ops.render.render(write_still=True)
-        return read_exr(folder + "/image.exr")
+        return read_exr(folder + "/image.exr", layer)
+
+
+def both(cycles=64, samples=16, bounces=0, layer=None, **parameters):
+    """Passes of the scene, ours and Cycles'. Without bounces by default: direct light alone is nearly exact in both."""
+    with quiet():
+        set_cycles(cycles, bounces)
+        theirs = render(layer)
+        set_lumicut("exhaustive", samples, **{"vpls": 400, "max_depth": bounces} | parameters)
+        return render(layer), theirs
 
 
 def radiance(layers):

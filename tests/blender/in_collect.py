@@ -434,7 +434,7 @@ class MaterialTrees(unittest.TestCase):
         return m, node, texture
 
     def test_an_srgb_image_stays_bytes_and_its_first_row_is_the_top(self):
-        image = self.image()
+        image = self.image(colour=(0.5, 0.25, 1.0, 1.0))
         m, _, _ = self.with_image(image)
         out, _, data = the_material(m)
         self.assertEqual(out.diffuse_texture, 1)

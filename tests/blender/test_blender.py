@@ -22,7 +22,7 @@ LIBRARY = BUILD / "lib/liblumicut.so"
 PATIENCE = 900  # seconds until a hanging Blender is killed: not a measure of anything
 
 BATCHES = {
-    "units": ["in_light_units", "in_materials"],
+    "units": ["in_light_units", "in_materials", "in_images"],
     "scenes": ["in_addon", "in_cancel", "in_collect", "in_export", "in_frames"],
 }
 

@@ -1,0 +1,167 @@
+"""Images as Blender shows them: alpha, UDIM tiles, sequences, curves. Each beside Cycles, as what a plane emits
+or reflects."""
+import os
+import tempfile
+import unittest
+
+import bpy
+import numpy as np
+
+import helpers as h
+
+
+def image_of(name, texels, space="sRGB", as_float=False):
+    """(h, w, 3 or 4) texels, top row first, as they are stored; packed."""
+    height, width, channels = texels.shape
+    image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=as_float)
+    image.colorspace_settings.name = space
+    pixels = np.ones((height, width, 4), np.float32)
+    pixels[..., :channels] = texels
+    image.pixels.foreach_set(pixels[::-1].reshape(-1))
+    image.update()
+    return image
+
+
+def halves(left, right, size=16):
+    texels = np.empty((size, 2 * size, len(left)), np.float32)
+    texels[:, :size], texels[:, size:] = left, right
+    return texels
+
+
+class Images(unittest.TestCase):
+    def setUp(self):
+        self.scene = h.new_scene(32, 16)
+        self.scene.camera.data.type, self.scene.camera.data.ortho_scale = "ORTHO", 4
+        h.set_world((1, 1, 1))
+
+    def board(self, material, uvs=((0, 0), (1, 0), (1, 1), (0, 1))):
+        plane = h.add_mesh("Board", [(-2, -1, 0), (2, -1, 0), (2, 1, 0), (-2, 1, 0)], [(0, 1, 2, 3)], material)
+        plane.data.uv_layers.new(name="Map").data.foreach_set("uv", np.ravel(uvs))
+        return plane
+
+    def textured(self, image, shader="ShaderNodeEmission", socket="Color"):
+        """(material, image node, shader node)"""
+        m = h.material("Textured")
+        node = h.shader(m, shader)
+        texture = m.node_tree.nodes.new("ShaderNodeTexImage")
+        texture.image = image
+        m.node_tree.links.new(texture.outputs["Color"], node.inputs[socket])
+        return m, texture, node
+
+    def compare(self, tolerance=0.01, **settings):
+        """Means of the left and of the right half agree; gives ours."""
+        ours, theirs = h.both(samples=4, cycles=32, **settings)
+        means = [[h.radiance(x)[2:-2, a:b].mean((0, 1)) for a, b in ((2, 14), (18, 30))] for x in (ours, theirs)]
+        np.testing.assert_allclose(means[0], means[1], rtol=tolerance, atol=0.002)
+        return means[0]
+
+    def test_alpha_that_is_not_linked_darkens_as_stored(self):
+        m, texture, _ = self.textured(image_of("a", halves((.8, .6, .4, .25), (.8, .6, .4, 1))))
+        self.board(m)
+        left, right = self.compare()
+        self.assertLess(left[0], 0.1 * right[0])  # 0.25 of the sRGB value, which is less of the light
+        for mode in ("CHANNEL_PACKED", "NONE"):
+            with self.subTest(mode=mode):
+                texture.image.alpha_mode = mode
+                left, right = self.compare()
+                np.testing.assert_allclose(left, right, rtol=1e-3)
+
+    def test_data_are_not_darkened_by_alpha(self):
+        m, _, _ = self.textured(image_of("a", halves((.8, .6, .4, .25), (.8, .6, .4, 1)), "Non-Color"))
+        self.board(m)
+        left, right = self.compare()
+        np.testing.assert_allclose(left, right, rtol=1e-3)
+
+    def test_alpha_that_is_linked_leaves_colours_alone_and_floats_are_divided_by_it(self):
+        for as_float in (False, True):
+            with self.subTest(as_float=as_float):
+                self.setUp()
+                image = image_of("a", halves((.8, .6, .4, .25), (.8, .6, .4, 1)), "Linear" if as_float else "sRGB", as_float)
+                m, texture, _ = self.textured(image)
+                output = next(n for n in m.node_tree.nodes if n.type == "OUTPUT_MATERIAL")
+                mix, dark = (m.node_tree.nodes.new("ShaderNode" + kind) for kind in ("MixShader", "Emission"))
+                dark.inputs["Color"].default_value = (0, 0, 0, 1)
+                m.node_tree.links.new(texture.outputs["Alpha"], mix.inputs[0])
+                m.node_tree.links.new(dark.outputs[0], mix.inputs[1])
+                m.node_tree.links.new(output.inputs["Surface"].links[0].from_socket, mix.inputs[2])
+                m.node_tree.links.new(mix.outputs[0], output.inputs["Surface"])
+                self.board(m)
+                left, right = self.compare()
+                np.testing.assert_allclose(left, right * (1 if as_float else 0.25), rtol=0.01)
+
+    def tiles(self, folder, packed):
+        """An image of the tiles 1001, 1002 and 1012."""
+        for number, colour in ((1001, (.9, .05, .05)), (1002, (.05, .9, .05)), (1012, (.1, .2, .9))):
+            tile = image_of(str(number), np.full((8, 8, 3), colour, np.float32))
+            tile.filepath_raw, tile.file_format = f"{folder}/t.{number}.png", "PNG"
+            tile.save()
+            bpy.data.images.remove(tile)
+        image = bpy.data.images.load(f"{folder}/t.1001.png")
+        image.source, image.filepath = "TILED", f"{folder}/t.<UDIM>.png"
+        for number in (1002, 1012):
+            if number not in {tile.number for tile in image.tiles}:
+                image.tiles.new(number)
+        if packed:
+            image.pack()
+            for name in os.listdir(folder):
+                os.remove(f"{folder}/{name}")
+        return image
+
+    def test_udim_tiles_lie_where_cycles_lays_them(self):
+        for packed in (False, True):
+            for v in (0, 1):
+                with self.subTest(packed=packed, row=v), tempfile.TemporaryDirectory() as folder:
+                    self.setUp()
+                    m, texture, _ = self.textured(self.tiles(folder, packed))
+                    texture.interpolation = "Closest"
+                    self.board(m, ((0, v), (2, v), (2, 1 + v), (0, 1 + v)))
+                    left, right = self.compare()
+                    self.assertGreater(abs(left - right).max(), 0.5)
+                    self.assertFalse(any("first" in note for note in h.last_notes()), h.last_notes())
+                    if v == 1:  # no tile 1011
+                        np.testing.assert_allclose(left, (1, 0, 1), atol=1e-3)
+
+    def test_sequences_show_the_picture_of_their_frame(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for number in range(1, 6):
+                picture = image_of(str(number), np.full((4, 8, 3), number / 6, np.float32))
+                picture.filepath_raw, picture.file_format = f"{folder}/s_{number:04d}.png", "PNG"
+                picture.save()
+                bpy.data.images.remove(picture)
+            image = bpy.data.images.load(f"{folder}/s_0001.png")
+            image.source = "SEQUENCE"
+            m, texture, _ = self.textured(image)
+            user = texture.image_user
+            self.board(m)
+            shown = []
+            for frame, start, offset, cyclic in ((2, 1, 0, False), (4, 2, 1, False), (9, 1, 0, False), (7, 1, 0, True)):
+                user.frame_duration, user.frame_start, user.frame_offset, user.use_cyclic = 5, start, offset, cyclic
+                user.use_auto_refresh = True
+                self.scene.frame_set(frame)
+                with self.subTest(frame=frame, start=start, offset=offset, cyclic=cyclic):
+                    shown.append(self.compare()[0][0])
+        self.assertEqual([round(6 * (1.055 * v ** (1 / 2.4) - 0.055)) for v in shown], [2, 4, 5, 2])
+
+    def test_curves_bend_images_and_constants_as_in_cycles(self):
+        x = np.linspace(0.05, 0.95, 32)
+        texels = np.stack(np.broadcast_arrays(x[None], x[::-1][None], np.full((16, 32), 0.3)), -1)
+        for kind, extend in (("RGBCurve", "EXTRAPOLATED"), ("RGBCurve", "HORIZONTAL"), ("FloatCurve", "EXTRAPOLATED")):
+            with self.subTest(kind=kind, extend=extend):
+                self.setUp()
+                m, texture, node = self.textured(image_of("ramp", texels, "Non-Color", True))
+                curves = m.node_tree.nodes.new("ShaderNode" + kind)
+                curves.inputs[0].default_value = 0.8
+                mapping = curves.mapping
+                mapping.extend = extend
+                mapping.curves[0].points.new(0.3, 0.6)
+                mapping.curves[0].points[0].location = (0.1, 0.05)
+                if kind == "RGBCurve":
+                    mapping.curves[1].points.new(0.5, 0.2)
+                    mapping.curves[3].points.new(0.6, 0.7)
+                mapping.update()
+                m.node_tree.links.new(texture.outputs["Color"], curves.inputs[1])
+                m.node_tree.links.new(curves.outputs[0], node.inputs["Color"])
+                self.board(m)
+                # The picture's texels are bent here, its filtered colours there; ramps differ little.
+                self.compare(0.02)
+                self.assertEqual(h.last_notes(), [])
