@@ -247,8 +247,13 @@ class SceneReader {
     const auto colour = [&](const char* key, float* out, double maximum) {
       if (auto value = object.find(key)) store(out, value->vector3(0, maximum));
     };
-    colour("diffuse", m.diffuse, 1);
-    colour("specular", m.specular, 1);
+    // A texture's factor may be above 1: the product is cut, place by place.
+    const auto most = [&](const char* key, int32_t inherited) {
+      const auto given = object.find(key);
+      return (given ? !given->raw().is_null() : inherited > 0) ? 1e6 : 1.0;
+    };
+    colour("diffuse", m.diffuse, most("diffuse_texture", m.diffuse_texture));
+    colour("specular", m.specular, most("specular_texture", m.specular_texture));
     colour("emission", m.emission, 1e15);
     if (auto opacity = object.find("opacity")) m.opacity = std::max(kHole, static_cast<float>(opacity->number(0, 1)));
     if (auto model = object.find("model")) {

@@ -82,8 +82,10 @@ Material to_material(const lumicut_material& in, uint64_t index) {
     if (in.metallic > 0.0f) c.fail("metallic", "must be 0 with LUMICUT_NO_FRESNEL");
     if (in.transmission > 0.0f) c.fail("transmission", "must be 0 with LUMICUT_NO_FRESNEL");
   }
-  c.range("diffuse", in.diffuse, 0.0f, 1.0f);
-  c.range("specular", in.specular, 0.0f, 1.0f);
+  // Of a textured colour the product must be a share, not the factor: Scene::bsdf_parameters sees to that.
+  constexpr float kLargestFactor = 1e6f;
+  c.range("diffuse", in.diffuse, 0.0f, in.diffuse_texture > 0 ? kLargestFactor : 1.0f);
+  c.range("specular", in.specular, 0.0f, in.specular_texture > 0 ? kLargestFactor : 1.0f);
   c.range("shininess", in.shininess, 0.0f, 1e6f);
   c.range("opacity", in.opacity, 0.0f, 1.0f);
   c.not_negative("emission", in.emission);

@@ -340,10 +340,12 @@ SurfaceInteraction Scene::interaction(const SurfaceHit& hit, const Vec3f& to_vie
 
 BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv) const {
   const Material& m = materials_[material];
-  const auto texel = [&](const Rgb& factor, int32_t texture) {
-    return texture < 0 ? factor : factor * textures_[texture].color(uv.x, uv.y);
-  };
   const auto share = [](float x) { return std::min(1.0f, std::max(0.0f, x)); };
+  const auto texel = [&](const Rgb& factor, int32_t texture) {
+    if (texture < 0) return factor;
+    const Rgb c = factor * textures_[texture].color(uv.x, uv.y);
+    return Rgb{share(c.x), share(c.y), share(c.z)};
+  };
   BsdfParameters p;
   p.model = m.lobe;
   p.diffuse = texel(m.diffuse, m.diffuse_texture), p.specular = texel(m.specular, m.specular_texture);

@@ -15,8 +15,7 @@ from .images import Images, Picture, image_of
 from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Mapping, Value, input_of
 
 HOLE = 1e-3  # an opacity that the library takes as "not there"; 0 means 1 to it
-
-
+LARGEST_FACTOR = 1e6  # of a texture, in the library
 MIRROR = 0.1  # roughness below which the library follows a reflection instead of shading it
 
 
@@ -105,6 +104,14 @@ class Surface:
     rough_picture: Value = None  # `roughness` is its mean then
     by_place: ByPlace = None
     clearcoat: ClearCoat = None
+
+
+def cut_of(factor, picture):
+    """The share of a colour, of a picture's in the mean, that lies above 1."""
+    if not (factor > 1).any() and (picture is None or picture.is_byte()):
+        return 0.0
+    colours = factor if picture is None else factor * picture.linear()
+    return float(np.maximum(colours - 1, 0).mean() / max(colours.mean(), 1e-9))
 
 
 def luminance(value):
@@ -468,11 +475,10 @@ class Materials:
             if value.picture is not None:
                 pictures[slot] = value.picture
         for slot in ("diffuse", "specular"):
-            if (factors[slot] > 1.07).any():  # white by Burley's albedo goes without saying
+            if cut_of(factors[slot], pictures.get(slot)) > 0.07:  # white by Burley's albedo goes without saying
                 self.report.note(name, "Colours above 1 cut to 1")
-            if (factors[slot] > 1).any():
-                factors[slot] = np.minimum(factors[slot], 1)
-            getattr(m, slot)[:] = factors[slot].tolist()
+            # With a picture the library cuts the product.
+            getattr(m, slot)[:] = np.minimum(factors[slot], 1 if slot not in pictures else LARGEST_FACTOR).tolist()
         m.emission[:] = factors["emission"].tolist()
         if factors["emission"].any():
             m.flags |= library.EMIT_BOTH_SIDES
@@ -565,7 +571,8 @@ class Materials:
             self.report.note(name, "Coats that reflect more than 66 % straight on, cut to that")
         if glass <= 0 or normal_reflectance(m.ior) < most:
             m.ior = ior_of(most)
-        return Value(np.minimum(1, f0.factor / normal_reflectance(m.ior)), f0.picture)
+        factor = f0.factor / normal_reflectance(m.ior)
+        return Value(factor if f0.picture is not None else np.minimum(1, factor), f0.picture)
 
     @staticmethod
     def _mask(picture):

@@ -1,4 +1,4 @@
-"""Images as Blender shows them: alpha, UDIM tiles, sequences, curves. Each beside Cycles, as what a plane emits
+"""Images as Blender shows them: alpha, factors, UDIM tiles, sequences, curves. Each beside Cycles, as what a plane emits
 or reflects."""
 import os
 import tempfile
@@ -88,6 +88,36 @@ class Images(unittest.TestCase):
                 self.board(m)
                 left, right = self.compare()
                 np.testing.assert_allclose(left, right * (1 if as_float else 0.25), rtol=0.01)
+
+    def test_a_factor_above_1_stays_until_it_has_met_the_texture(self):
+        for value in (51 / 255, 102 / 255):
+            with self.subTest(value=value):
+                self.setUp()
+                m, _, node = self.textured(image_of("g", np.full((4, 4, 3), value, np.float32), "Non-Color"),
+                                           "ShaderNodeBsdfPrincipled", "Base Color")
+                node.inputs["Roughness"].default_value = 0.8
+                board = self.board(m)
+                with h.quiet():
+                    h.set_lumicut("exhaustive", vpls=2000, max_depth=0)
+                    textured = h.radiance(h.render()).mean()
+                    self.assertFalse(any("above 1" in note for note in h.last_notes()), h.last_notes())
+                    constant = h.material("Constant")
+                    h.shader(constant, "ShaderNodeBsdfPrincipled", Base_Color=(value, value, value, 1), Roughness=0.8)
+                    board.data.materials[0] = constant
+                    self.assertAlmostEqual(h.radiance(h.render()).mean() / textured, 1, delta=1e-4)
+
+    def test_what_stays_above_1_in_a_whole_picture_is_named(self):
+        m, texture, node = self.textured(image_of("g", np.full((4, 4, 3), 0.9, np.float32), "Non-Color"), "ShaderNodeBsdfDiffuse")
+        scale = m.node_tree.nodes.new("ShaderNodeMixRGB")
+        scale.blend_type = "MULTIPLY"
+        scale.inputs[0].default_value, scale.inputs[2].default_value = 1, (1.5, 1.5, 1.5, 1)
+        m.node_tree.links.new(texture.outputs["Color"], scale.inputs[1])
+        m.node_tree.links.new(scale.outputs[0], node.inputs["Color"])
+        self.board(m)
+        with h.quiet():
+            h.set_lumicut("exhaustive", vpls=100)
+            h.render()
+        self.assertIn("Colours above 1 cut to 1: Textured", h.last_notes())
 
     def tiles(self, folder, packed):
         """An image of the tiles 1001, 1002 and 1012."""

@@ -174,6 +174,22 @@ TEST(SceneJson, TheEnvironmentMayHaveARotationOfItsOwnAndBeHidden) {
   expect_in(error_of([&] { read_scene(file); }), {"environment", "rotation", "world_to_map"});
 }
 
+TEST(SceneJson, ColoursThatMultiplyATextureMayBeAboveOne) {
+  const TemporaryFolder folder;
+  Image image;
+  image.width = 2, image.height = 1;
+  image.layers = {{"radiance", 3, {1, 1, 1, 1, 1, 1}}};
+  write_exr(folder / "a.exr", image, false);
+  json scene = json::parse(kScene);
+  const size_t first = scene["materials"].size();
+  scene["materials"].push_back({{"name", "paper"}, {"diffuse", {1.5, 1, 1}}, {"diffuse_texture", "a.exr"}});
+  const SceneData data = read_scene(folder.write("scene.json", scene.dump()));
+  EXPECT_EQ(data.materials.at(first).values.diffuse[0], 1.5f);
+  scene["materials"][first]["specular"] = {1.5, 1, 1};
+  const std::string file = folder.write("scene.json", scene.dump());
+  expect_in(error_of([&] { read_scene(file); }), {"specular[0]", "1.5"});
+}
+
 TEST(SceneJson, ATextureMaySayThatItEndsAndIsNotFiltered) {
   const TemporaryFolder folder;
   Image image;

@@ -294,6 +294,17 @@ TEST(Scene, TexturesOfRoughnessAndMetalMultiplyGreenAndBlue) {
   EXPECT_EQ(max_component(of_sharp.layers()[0].specular), 0.0f);
 }
 
+TEST(Scene, FactorsAboveOneStayUntilTheTextureHasMultipliedThem) {
+  const float texels[6] = {0.5f, 0.25f, 0.9f, 4.0f, -1.0f, 0.5f};
+  Material m = test::diffuse(1.5f, 2.0f, 1.25f);
+  m.specular = {3, 0.5f, 1}, m.diffuse_texture = m.specular_texture = 0;
+  const auto scene = square(m, {Texture(2, 1, 3, Texture::Format::float32, {false, true, true}, texels)});
+  const BsdfParameters left = scene->bsdf_parameters(0, {0.2f, 0.5f}), right = scene->bsdf_parameters(0, {0.8f, 0.5f});
+  EXPECT_EQ(left.diffuse, (Rgb{0.75f, 0.5f, 1})) << "1.25 times 0.9 is cut";
+  EXPECT_EQ(left.specular, (Rgb{1, 0.125f, 0.9f}));
+  EXPECT_EQ(right.diffuse, (Rgb{1, 0, 0.625f})) << "so is what a texture holds beyond 0 to 1";
+}
+
 TEST(Scene, WithoutFresnelALobeReflectsAsMuchAtEveryAngle) {
   Material m = test::diffuse(0.5f, 0.25f, 0.125f);
   m.lobe = LobeModel::ggx, m.fresnel = false, m.specular = {0.3f, 0.2f, 0.1f};

@@ -110,9 +110,9 @@ typedef struct lumicut_scene_desc {
 typedef struct lumicut_material {
   uint32_t struct_size;
   uint32_t flags;          /* LUMICUT_EMIT_BOTH_SIDES; LUMICUT_PHONG: the specular lobe is Phong's, LUMICUT_GGX: GGX's, else Blinn's */
-  float diffuse[3];        /* kd, 0..1 */
+  float diffuse[3];        /* kd, 0..1; with a texture 0..1e6: their product is cut to 0..1, place by place */
   float shininess;         /* n, the lobe's exponent, >= 0 */
-  float specular[3];       /* ks, 0..1: Blinn ks (n+2)/2pi cos^n(beta); Phong ks/2pi cos^n(beta); see docs/scene_format.md */
+  float specular[3];       /* ks, as diffuse: Blinn ks (n+2)/2pi cos^n(beta); Phong ks/2pi cos^n(beta); see docs/scene_format.md */
   float opacity;           /* share of the rays that the surface stops, times its texture; 0: not given, taken as 1; below 1/256 a hole */
   float emission[3];       /* radiance, on the side the geometric normal points to */
   int32_t diffuse_texture, specular_texture, opacity_texture, emission_texture; /* 1 + index into the textures; 0: none. Factors multiply */
