@@ -12,9 +12,10 @@ import numpy as np
 from . import library, lights
 from .materials import Materials
 from .report import Report
-from .scene_data import Mesh, SceneData, is_flat
+from .scene_data import Mesh, SceneData, flattened, is_flat
 
 AS_MESH = {"CURVE", "FONT", "META", "SURFACE"}  # a MESH item follows for each
+RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
 LEFT_OUT = {"VOLUME": "Volumes left out", "CURVES": "Hair and curve objects left out",
             "POINTCLOUD": "Point clouds left out", "GPENCIL": "Grease pencil left out",
             "GREASEPENCIL": "Grease pencil left out"}
@@ -199,14 +200,16 @@ class Collector:
         self.materials.images.frame = depsgraph.scene_eval.frame_current
         self.scene = SceneData()
         self.profiles = lights.Profiles(self.report)
-        self._meshes = {}
+        self._meshes, self._flat = {}, []  # by what they are made from; those of flat instances
+        self._looked_at = set()
         self.instances = 0
         # Light groups by name: 0 holds all that is in none.
         names = getattr(depsgraph.view_layer_eval, "lightgroups", ())
         self.groups = {group.name: 1 + i for i, group in enumerate(names)}
 
     def collect(self):
-        override = self.depsgraph.view_layer_eval.material_override
+        layer = self.depsgraph.view_layer_eval
+        override = layer.material_override
         for count, instance in enumerate(self.depsgraph.object_instances):
             if count % 64 == 0:
                 self.check()
@@ -216,7 +219,8 @@ class Collector:
             ob = instance.object
             if ob.type == "MESH":
                 self._check_particles(instance)
-                self._add_mesh(instance, ob, override)
+                if layer.use_solid:
+                    self._add_mesh(instance, ob, override)
             elif ob.type == "LIGHT":
                 light = lights.convert_light(ob.name, ob.data, instance.matrix_world, self.materials.images, self.report,
                                              self.profiles)
@@ -228,15 +232,16 @@ class Collector:
             elif ob.type in LEFT_OUT:
                 self.report.note(ob.name, LEFT_OUT[ob.type])
         self.check()
-        self.scene.meshes = [mesh for mesh in self._meshes.values() if mesh is not None and mesh.transforms]
+        self.scene.meshes = [mesh for mesh in self._meshes.values() if mesh is not None and mesh.transforms] + self._flat
         scene = self.depsgraph.scene_eval
         bake = (lambda world: self.bake(world, scene.frame_current, self.check)) if self.bake is not None else None
-        self.scene.environment, suns = lights.convert_world(scene.world, self.materials, self.report, bake)
+        world = (getattr(layer, "world_override", None) or scene.world) if layer.use_sky else None
+        self.scene.environment, suns = lights.convert_world(world, self.materials, self.report, bake)
         for name, sun in suns:
-            sun.group = self._group(scene.world)
+            sun.group = self._group(world)
             self.scene.lights.append((name, sun))
         if self.scene.environment is not None:
-            self.scene.environment.group = self._group(scene.world)
+            self.scene.environment.group = self._group(world)
         if self.scene.environment is not None and scene.render.film_transparent:
             self.scene.environment.flags |= library.HIDDEN
         if scene.render.use_motion_blur:
@@ -275,38 +280,59 @@ class Collector:
         key = (mesh.as_pointer(), tuple(numbers), group)
         if key not in self._meshes:
             self.check()
-            self._meshes[key] = found = self._read(ob, mesh, slots, numbers)
+            found = self._read(ob, mesh, slots, numbers)
             if found is not None:
                 found.group = group
-            for flag, text in (("is_holdout", "Holdouts taken as ordinary objects"),
-                               ("is_shadow_catcher", "Shadow catchers taken as ordinary objects")):
-                if getattr(ob, flag, False):
-                    self.report.note(ob.name, text)
-            if not ob.visible_camera or not ob.visible_shadow or not ob.visible_diffuse:
-                self.report.note(ob.name, "Objects hidden from some rays, which all see here")
+                if all(self.materials.converted[n].is_hole() for n in found.numbers()):
+                    found = None
+            self._meshes[key] = found
+        if ob.as_pointer() not in self._looked_at:
+            self._looked_at.add(ob.as_pointer())
+            self._check_flags(ob)
         target = self._meshes[key]
         if target is not None:
             transform = rows(instance.matrix_world)
             if is_flat(transform):
-                self.report.note(ob.name, "Objects scaled to nothing left out")
+                target = flattened(target, transform)
+                if target is not None:
+                    self._flat.append(target)
+                    self.instances += 1
                 return
             target.transforms.append(transform)
             self.instances += 1
 
+    def _check_flags(self, ob):
+        for flag, text in (("is_holdout", "Holdouts taken as ordinary objects"),
+                           ("is_shadow_catcher", "Shadow catchers taken as ordinary objects")):
+            if getattr(ob, flag, False):
+                self.report.note(ob.name, text)
+        if not all(getattr(ob, "visible_" + ray) for ray in RAYS):
+            self.report.note(ob.name, "Objects hidden from some rays, which all see here")
+
     def _read(self, ob, mesh, slots, numbers):
         if self.cache is None:
-            return MeshReader(ob.name, mesh, numbers, self.materials, self.report, self.check).read()
+            return self._convert(ob, mesh, numbers)
         # Evaluated data move in memory; the originals' names say what they came from.
         mappings = tuple(self.materials.converted[n].mapping if self.materials.converted[n].pictures else None for n in numbers)
         names = frozenset({ob.name_full, mesh.name_full})
         key = (mesh.as_pointer(), mappings, names, tuple(numbers), len(mesh.vertices), len(mesh.loops))
         found = self.cache.meshes.get(key)
         if found is None:
-            found = MeshReader(ob.name, mesh, numbers, self.materials, self.report, self.check).read()
+            found = self._convert(ob, mesh, numbers)
             if found is None:
                 return None
             self.cache.meshes[key] = found
         return Mesh(found.name, found.positions, found.indices, found.normals, found.uvs, found.materials, found.material, [])
+
+    def _convert(self, ob, mesh, numbers):
+        edited = mesh.is_editmode  # its faces are with the editor, the mesh is empty
+        if edited:
+            mesh = ob.to_mesh(preserve_all_data_layers=True, depsgraph=self.depsgraph)
+        try:
+            return MeshReader(ob.name, mesh, numbers, self.materials, self.report, self.check).read()
+        finally:
+            if edited:
+                ob.to_mesh_clear()
 
 
 def fit(render, camera_data):

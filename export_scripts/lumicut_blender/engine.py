@@ -123,7 +123,7 @@ class LumicutEngine(bpy.types.RenderEngine):
         settings = depsgraph.scene.lumicut
         started = time.perf_counter()
         self.say("collecting the scene")
-        report = Report()
+        report = self._report_of(scene.frame_current)
         data = collect.Collector(depsgraph, report, self._check, max_shininess=settings.max_shininess,
                                  bake=None if self.is_preview else sky.bake).collect()
         camera = self.camera_override or scene.camera
@@ -195,7 +195,15 @@ class LumicutEngine(bpy.types.RenderEngine):
             return
         runtime.last["notes"] = report.lines()
         for line in report.lines(most_names=12):
-            self.report({"INFO"}, f"Lumicut: {line}")  # printed, where there is no window
+            if line not in self._told:
+                self._told.add(line)
+                self.report({"INFO"}, f"Lumicut: {line}")  # printed, where there is no window
+
+    def _report_of(self, frame):
+        """One for all view layers of a frame, which this is called for one after the other."""
+        if getattr(self, "_notes", (None,))[0] != frame:
+            self._notes, self._told = (frame, Report()), set()
+        return self._notes[1]
 
     def _follow(self, render, depsgraph, crop, height, groups):
         """Polls until the frame is done; hands tiles over as they finish."""

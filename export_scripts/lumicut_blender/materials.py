@@ -128,6 +128,8 @@ class SurfaceReader(Evaluator):
         node, output, stack = self.source(socket, stack)
         if node is None:
             return Surface()
+        if output.type != "SHADER":  # a colour where a shader should be: Cycles lets it shine
+            return Surface(emission=self.node_value(node, output, stack))
         handler = getattr(self, "closure_" + node.type.lower(), None)
         if handler is None:
             self.note(node.bl_label or node.type, "Shaders left out")
@@ -422,6 +424,10 @@ class Converted:
     pictures: dict
     mapping: Mapping
 
+    def is_hole(self):
+        """Whether no ray meets it."""
+        return self.values.opacity < 2 * HOLE and "opacity" not in self.pictures and not any(self.values.emission)
+
 
 SLOTS = ("diffuse", "specular", "emission", "opacity")
 
@@ -598,4 +604,6 @@ class Materials:
                 reader.note("", f"{socket}s left out" if socket == "Volume" else "Displacement left out")
         # Outputs inside a group cannot be: the output stands in the tree itself.
         surface = reader.surface(output.inputs["Surface"])
+        if output.inputs["Volume"].is_linked and not output.inputs["Surface"].is_linked:
+            surface = Surface(opacity=ZERO, clear=True)  # no surface: rays pass
         return surface, reader.normals, reader.heights

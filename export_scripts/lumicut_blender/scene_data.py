@@ -27,6 +27,10 @@ class Mesh:
     transforms: list = dataclasses.field(default_factory=list)  # 3x4 each, one an instance
     group: int = 0                       # light group of what it emits
 
+    def numbers(self):
+        """Of all materials in use."""
+        return [self.material] if self.materials is None else np.unique(self.materials)
+
 
 @dataclasses.dataclass
 class Profile:
@@ -64,9 +68,23 @@ def baked(mesh, check=lambda: None):
 
 
 def is_flat(transform):
-    """Whether an instance has no volume: nothing of it can be seen from most sides, and normals do not exist."""
-    m = np.array(transform, np.float64).reshape(3, 4)
-    return not abs(np.linalg.det(m[:, :3])) > 0
+    """Whether an instance is scaled to nothing along an axis: it has no inverse, and is no instance to the library."""
+    m = np.array(transform, np.float64).reshape(3, 4)[:, :3]
+    return not abs(np.linalg.det(m)) > 1e-12 * np.abs(m).max() ** 3
+
+
+def flattened(mesh, transform):
+    """A mesh of its own in place of a flat instance; None where nothing but a line or a point remains."""
+    m = np.array(transform, np.float64).reshape(3, 4)[:, :3]
+    sizes = np.linalg.svd(m, compute_uv=False)
+    if not sizes[1] > 1e-6 * sizes[0]:
+        return None
+    alone = dataclasses.replace(mesh, transforms=[transform])
+    positions, normals, indices = baked(alone)
+    return dataclasses.replace(alone, positions=positions, normals=normals, indices=indices, transforms=[IDENTITY])
+
+
+IDENTITY = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
 
 
 @dataclasses.dataclass

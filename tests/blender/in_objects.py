@@ -1,0 +1,165 @@
+"""Objects and view layers beside Cycles: edit mode, flat scales, volumes alone, colours as shaders, overrides, filters."""
+import unittest
+
+import bpy
+import numpy as np
+
+import helpers as h
+
+CUBE = ([(x, y, z) for z in (-1, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))],
+        [(3, 2, 1, 0), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)])
+
+
+class BesideCycles(unittest.TestCase):
+    def setUp(self):
+        self.scene = h.new_scene(32, 32)
+        self.scene.view_layers[0].use_pass_z = True
+        h.add_light("SUN", energy=3, rotation=(0.4, 0.3, 0), angle=0.0)
+
+    def compare(self, most=0.01, cycles=16, samples=16, layer=None):
+        """Images agree in means of 4x4 pixels; gives ours and the notes."""
+        ours, theirs = h.both(cycles, samples, layer=layer)
+        a, b = (h.blocks(image["Combined"]) for image in (ours, theirs))
+        np.testing.assert_allclose(a.mean((0, 1)), b.mean((0, 1)), rtol=most, atol=1e-3)
+        self.assertLess(np.abs(a - b).max(), 0.06)  # at outlines 16 samples tell coverage to a few per cent
+        return ours, "\n".join(h.last_notes())
+
+
+class Objects(BesideCycles):
+    def test_objects_in_edit_mode_render_with_their_modifiers(self):
+        cube = h.add_mesh("Cube", *CUBE, h.diffuse((0.8, 0.3, 0.1)))
+        cube.data.materials.append(h.diffuse((0.1, 0.3, 0.8), "blue"))
+        cube.data.polygons[1].material_index = 1
+        other = h.link(bpy.data.objects.new("other", cube.data))
+        other.location, other.scale = (2, 0, 0), (0.3, 0.3, 0.3)
+        subdivision = cube.modifiers.new("subdivision", "SUBSURF")
+        subdivision.levels = subdivision.render_levels = 1
+        bpy.context.view_layer.objects.active = cube
+        cube.select_set(True)
+        bpy.ops.object.mode_set(mode="EDIT")
+        try:
+            ours, _ = self.compare()
+        finally:
+            bpy.ops.object.mode_set(mode="OBJECT")
+        self.assertGreater((ours["Depth"] < 100).mean(), 0.1)
+        with h.quiet():
+            again = h.render()
+        np.testing.assert_array_equal(again["Combined"], ours["Combined"])
+
+    def test_what_is_scaled_flat_renders(self):
+        plane = h.add_plane(3, material=h.diffuse())
+        plane.scale, plane.rotation_euler = (1, 1, 0), (0.5, 0.2, 0.1)
+        _, notes = self.compare()
+        self.assertNotIn("left out", notes)
+
+    def test_flat_instances_render_as_meshes_of_their_own_do(self):
+        """Without Cycles: its Embree ends Debian's Blender over an instance that has no inverse, and balls without
+        thickness are black there where their halves shadow each other."""
+        ball = h.add_sphere(0.7, (-1, -1, 1.5), h.diffuse((0.8, 0.2, 0.1)))
+        others = [h.link(bpy.data.objects.new("other", ball.data)) for _ in range(3)]
+        for x, other in enumerate(others):
+            other.location, other.rotation_euler = (x - 0.5, 1, 1.5), (0, 0.9, 0)
+            other.scale = ((0.5, 0.5, 0.5), (0, 0.5, 0.5), (-0.5, 0.5, 0))[x]
+        with h.quiet():
+            h.set_lumicut("exhaustive", 16, vpls=400, max_depth=0)
+            shared = h.radiance(h.render())
+            self.assertEqual(h.last_stats()["scene"]["instances"], 4)
+            for other in others:
+                other.data = other.data.copy()
+            own = h.radiance(h.render())
+        np.testing.assert_allclose(shared, own, atol=1e-3)
+
+    def test_a_volume_alone_is_not_there_and_named(self):
+        h.add_plane(3, material=h.diffuse())
+        m = h.material("Haze")
+        volume = m.node_tree.nodes.new("ShaderNodeVolumePrincipled")
+        volume.inputs["Density"].default_value = 1e-6
+        output = next(n for n in m.node_tree.nodes if n.type == "OUTPUT_MATERIAL")
+        m.node_tree.links.new(volume.outputs[0], output.inputs["Volume"])
+        box = h.add_mesh("Box", *CUBE, m)
+        box.data.materials.append(h.diffuse((0.8, 0.2, 0.1), "red"))
+        self.compare()
+        self.assertEqual(h.last_stats()["scene"]["meshes"], 1)
+        box.data.polygons[0].material_index = 1  # now one side of it is there
+        _, notes = self.compare()
+        self.assertEqual(h.last_stats()["scene"]["meshes"], 2)
+        self.assertIn("Volumes left out: Haze", notes)
+
+    def test_colours_in_place_of_shaders_shine(self):
+        m = h.material("Colour")
+        colour = m.node_tree.nodes.new("ShaderNodeRGB")
+        colour.outputs[0].default_value = (0.7, 0.4, 0.1, 1)
+        mix, diffuse = (m.node_tree.nodes.new("ShaderNode" + kind) for kind in ("MixShader", "BsdfDiffuse"))
+        output = next(n for n in m.node_tree.nodes if n.type == "OUTPUT_MATERIAL")
+        m.node_tree.links.new(colour.outputs[0], output.inputs["Surface"])
+        h.add_plane(3, material=m)
+        self.compare()
+        m.node_tree.links.new(colour.outputs[0], mix.inputs[1])
+        m.node_tree.links.new(diffuse.outputs[0], mix.inputs[2])
+        m.node_tree.links.new(mix.outputs[0], output.inputs["Surface"])
+        _, notes = self.compare()
+        self.assertEqual(notes, "")
+
+    def test_without_use_nodes_colours_are_those_of_the_viewport(self):
+        m = h.emission(20)
+        m.use_nodes, m.diffuse_color = False, (0.7, 0.4, 0.1, 1)
+        h.add_plane(3, material=m)
+        self.scene.world.use_nodes, self.scene.world.color = False, (0.1, 0.2, 0.3)
+        lamp = next(ob for ob in self.scene.objects if ob.type == "LIGHT").data
+        lamp.use_nodes = True
+        next(n for n in lamp.node_tree.nodes if n.type == "EMISSION").inputs["Strength"].default_value = 7
+        lamp.use_nodes = False
+        self.compare(cycles=256)
+
+
+class Layers(BesideCycles):
+    def setUp(self):
+        super().setUp()
+        h.set_world((0.1, 0.2, 0.4))
+        h.add_plane(3, material=h.diffuse())
+        self.ball = h.add_sphere(0.5, (0.5, 0, 1), h.emission(2, (1, 0.5, 0.2)))
+        self.layer = self.scene.view_layers[0]
+
+    def test_a_material_that_overrides(self):
+        self.layer.material_override = h.diffuse((0.2, 0.7, 0.3), "clay")
+        ours, _ = self.compare(cycles=256)
+        self.assertLess(ours["Combined"][..., 0].max(), 1)
+
+    def test_the_filter_of_the_environment(self):
+        self.layer.use_sky = False
+        for transparent in (False, True):
+            with self.subTest(transparent=transparent):
+                self.scene.render.film_transparent = transparent
+                self.compare(cycles=256)
+
+    def test_the_filter_of_surfaces(self):
+        self.layer.use_solid = False
+        ours, _ = self.compare()
+        self.assertGreater(ours["Depth"].min(), 1e9)
+
+    def test_several_layers_each_with_their_own_settings(self):
+        second = self.scene.view_layers.new("Second")
+        second.material_override = h.diffuse((0.2, 0.7, 0.3), "clay")
+        group = bpy.data.collections.new("Group")
+        self.scene.collection.children.link(group)
+        group.objects.link(self.ball)
+        self.scene.collection.objects.unlink(self.ball)
+        second.layer_collection.children["Group"].exclude = True
+        unused = self.scene.view_layers.new("Unused")
+        unused.use = False
+        first, _ = self.compare(0.02, cycles=256, layer=self.layer.name)  # a bright outline by 16 samples
+        other, _ = self.compare(cycles=256, layer="Second")
+        self.assertGreater(first["Combined"][..., 0].max(), 1.5)
+        self.assertLess(other["Combined"][..., 0].max(), 1)
+        self.assertNotIn("Depth", other)
+
+    def test_notes_of_all_layers_are_shown(self):
+        m = h.material("Toon")
+        h.shader(m, "ShaderNodeBsdfToon")
+        self.ball.data.materials[0] = m
+        second = self.scene.view_layers.new("Second")
+        second.material_override = h.diffuse((0.2, 0.7, 0.3), "clay")
+        with h.quiet():
+            h.set_lumicut("exhaustive", vpls=100)
+            h.render()
+        self.assertIn("Shaders taken as diffuse: Toon (Toon BSDF)", h.last_notes())
