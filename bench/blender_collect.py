@@ -13,7 +13,7 @@ import bpy  # noqa: E402
 import numpy as np  # noqa: E402
 
 import helpers as h  # noqa: E402
-from lumicut_blender import collect, engine  # noqa: E402
+from lumicut_blender import collect, passes  # noqa: E402
 
 
 def best(fn, count=5):
@@ -76,7 +76,7 @@ def main():
         def render(self, depsgraph):
             result = self.begin_result(0, 0, 1920, 1080)
             target = result.layers[0].passes["Combined"]
-            found["times"] = best(lambda: engine.write_pass(target, pixels))
+            found["times"] = best(lambda: passes.write_pass(target, pixels))
             self.end_result(result)
 
     bpy.utils.register_class(Probe)

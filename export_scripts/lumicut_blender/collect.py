@@ -4,12 +4,11 @@
 Arrays are filled by foreach_get in the type that Blender stores, which is a memory copy. A mesh is converted once for
 each set of materials; its instances are transforms.
 """
-import math
-
 import bpy
 import numpy as np
 
 from . import library, lights
+from .cameras import rows
 from .materials import Materials
 from .report import Report
 from .scene_data import Mesh, SceneData, flattened, is_flat
@@ -29,11 +28,6 @@ def fetch(collection, attribute, count, width, dtype):
     out = np.empty(count * width, dtype)
     collection.foreach_get(attribute, out)
     return out.reshape(count, width) if width > 1 else out
-
-
-def rows(matrix):
-    """The upper 3x4 of a matrix, row-major."""
-    return [c for row in matrix[:3] for c in row]
 
 
 def corner_vertices(mesh, count):
@@ -333,67 +327,3 @@ class Collector:
         finally:
             if edited:
                 ob.to_mesh_clear()
-
-
-def fit(render, camera_data):
-    """(horizontal, sensor width along the fitted side, aspect-corrected width and height)."""
-    width = render.resolution_x * render.pixel_aspect_x
-    height = render.resolution_y * render.pixel_aspect_y
-    mode = camera_data.sensor_fit
-    horizontal = mode == "HORIZONTAL" or (mode == "AUTO" and width >= height)
-    return horizontal, camera_data.sensor_height if mode == "VERTICAL" else camera_data.sensor_width, width, height
-
-
-def convert_camera(camera, scene, report):
-    """A library.Camera of a camera object, as the scene's resolution and pixel aspect frame it."""
-    data = camera.data
-    horizontal, sensor, width, height = fit(scene.render, data)
-    out = library.Camera()
-    m = camera.matrix_world.normalized()
-    out.to_world[:] = rows(m)
-    # What is given along the fitted side, in image heights.
-    heights = width / height if horizontal else 1.0
-    out.pixel_aspect = scene.render.pixel_aspect_x / scene.render.pixel_aspect_y
-    out.shift[:] = [data.shift_x * heights, data.shift_y * heights]
-    out.near_clip, out.far_clip = data.clip_start, data.clip_end
-    if data.type == "ORTHO":
-        out.orthographic = 1
-        out.height = data.ortho_scale / heights
-    else:
-        if data.type == "PANO":
-            report.note(camera.name, "Panoramic cameras taken as perspective ones")
-        out.fov_y = 2 * math.atan(sensor / (2 * data.lens) / heights)
-    if data.dof.use_dof:
-        distance = data.dof.focus_distance
-        if data.dof.focus_object is not None:
-            offset = data.dof.focus_object.matrix_world.translation - m.translation
-            distance = abs(offset @ m.col[2].to_3d())
-        stop = max(data.dof.aperture_fstop, 1e-5)
-        if distance > 0:
-            out.lens_radius = (1.0 if data.type == "ORTHO" else data.lens * 1e-3) / (2 * stop)
-            out.focus_distance = distance
-        if data.dof.aperture_blades > 2 or abs(data.dof.aperture_ratio - 1) > 1e-3:
-            report.note(camera.name, "Shapes of the aperture taken as a disk")
-    return out
-
-
-def viewport_camera(context, width, height):
-    """A library.Camera of a 3D view of width x height pixels."""
-    region, space = context.region_data, context.space_data
-    out = library.Camera(pixel_aspect=1.0)
-    out.to_world[:] = rows(region.view_matrix.inverted_safe().normalized())
-    projection = region.window_matrix  # the view's own: lens, zoom, offset of camera views, all in one
-    out.orthographic = 0 if region.is_perspective else 1
-    half_width, half_height = 1 / projection[0][0], 1 / projection[1][1]
-    if region.is_perspective:
-        out.fov_y = 2 * math.atan(half_height)
-        out.shift[:] = [projection[0][2] * half_width / (2 * half_height), projection[1][2] / 2]
-        out.near_clip, out.far_clip = space.clip_start, space.clip_end
-    else:
-        out.height = 2 * half_height
-        out.shift[:] = [-projection[0][3] * half_width / (2 * half_height), -projection[1][3] / 2]
-        # Orthographic views look from within: begin far behind.
-        back = np.array(region.view_matrix.inverted_safe())[:3, 2]
-        for k in range(3):
-            out.to_world[4 * k + 3] += float(back[k]) * space.clip_end * 0.5
-    return out

@@ -6,37 +6,17 @@ import time
 import traceback
 
 import bpy
-import numpy as np
 
-from . import collect, export, library, properties, runtime, sky, viewport
+from . import cameras, collect, export, library, passes, properties, runtime, sky, viewport
 from .report import Report
 
 POLL_MS = 40
 SHOW_SECONDS = 0.25  # between two changes of what is shown: each redraws the window, and a window that draws hears no key
-FLAT_RECTS = bpy.app.version >= (4, 1, 0)
-NO_DEPTH = 1e10  # as Cycles has it where nothing is hit
 export_requests = []  # folders that the next render writes a scene to, in place of rendering
 
 
 class Stopped(Exception):
     pass
-
-
-def write_pass(render_pass, pixels):
-    """pixels (h, w, channels), top row first, into a pass that counts rows from the bottom."""
-    pixels = np.ascontiguousarray(pixels[::-1], np.float32)
-    render_pass.rect.foreach_set(pixels.reshape(-1) if FLAT_RECTS else pixels.reshape(-1, pixels.shape[2]))
-
-
-def crop_of(render, width, height):
-    """(x0, y0, x1, y1), rows from the top, of the border; the whole where there is none."""
-    if not render.use_border:
-        return 0, 0, width, height
-    x0, x1 = int(render.border_min_x * width), int(render.border_max_x * width)
-    y0, y1 = int(render.border_min_y * height), int(render.border_max_y * height)
-    x0, y0 = min(max(x0, 0), width - 1), min(max(y0, 0), height - 1)
-    x1, y1 = max(min(x1, width), x0 + 1), max(min(y1, height), y0 + 1)
-    return x0, height - y1, x1, height - y0
 
 
 class Watched:
@@ -121,19 +101,25 @@ class LumicutEngine(bpy.types.RenderEngine):
         runtime.require()
         scene = depsgraph.scene_eval
         settings = depsgraph.scene.lumicut
+        if not self.is_preview and not export_requests:
+            passes.check_compositor(depsgraph.scene, depsgraph.view_layer_eval)
         started = time.perf_counter()
         self.say("collecting the scene")
         report = self._report_of(scene.frame_current)
         data = collect.Collector(depsgraph, report, self._check, max_shininess=settings.max_shininess,
                                  bake=None if self.is_preview else sky.bake).collect()
-        camera = self.camera_override or scene.camera
-        if camera is None:
-            raise library.Error(library.INVALID_STATE, "the scene has no camera")
-        data.camera = collect.convert_camera(camera, scene, report)
+        views = cameras.views_of(self, scene, report)
+        data.camera = views[0][1]
         collected = time.perf_counter() - started
         width, height = self.resolution_x, self.resolution_y
-        crop = crop_of(scene.render, width, height)
+        crop = cameras.crop_of(scene.render, width, height)
         self._options = self._render_options(depsgraph, settings, data.groups, report)
+        if export_requests:
+            factor = passes.exposure(scene)
+            if factor != 1:
+                report.note(f"{factor:g}", "Film exposure, which scene files do not have")
+            if len(views) > 1:
+                report.note(views[0][0], "Of several views the first alone is exported")
         self._tell(report)
         if export_requests and not self.is_preview:
             export.write_scene(export_requests[0], data, width, height, settings)
@@ -152,14 +138,16 @@ class LumicutEngine(bpy.types.RenderEngine):
             triangles, instances = data.triangles(), sum(len(m.transforms) for m in data.meshes)
             lamps, meshes, groups = len(data.lights), len(data.meshes), data.groups
             data = None  # the library has its own copy now
-            watched.run(target, "acceleration structure", target.commit)
-            self._check()
             for name, value in parameters.items():
                 integrator.set(name, value)
-            with library.Render(integrator, target, width, height, samples, crop, self._tile_size(crop),
-                                **self._options) as render:
-                self._follow(render, depsgraph, crop, height, groups)
-                stats = render.stats()
+            for self._view in views:
+                target.set_camera(self._view[1])
+                watched.run(target, "acceleration structure", target.commit)
+                self._check()
+                with library.Render(integrator, target, width, height, samples, crop, self._tile_size(crop),
+                                    **self._options) as render:
+                    self._follow(render, depsgraph, crop, height, groups)
+                    stats = render.stats()
         if not self.is_preview:
             runtime.last.update(stats=stats, collect_seconds=collected, seconds=time.perf_counter() - started,
                                 integrator=integrator_name, notes=report.lines(),
@@ -180,6 +168,7 @@ class LumicutEngine(bpy.types.RenderEngine):
         options = {name: getattr(settings, name) for name in properties.STOPS}
         layer = depsgraph.view_layer_eval
         options["flags"] = (library.ILLUMINANCE if layer.lumicut.use_pass_illuminance else 0) | (library.GROUPS if groups else 0)
+        passes.note_left_out(layer, report)
         if layer.lumicut.use_pass_error and settings.passes == 1:
             report.note(layer.name, "Error passes that are 0, as a single pass cannot tell")
         return options
@@ -207,7 +196,7 @@ class LumicutEngine(bpy.types.RenderEngine):
 
     def _follow(self, render, depsgraph, crop, height, groups):
         """Polls until the frame is done; hands tiles over as they finish."""
-        passes = self._pass_list(depsgraph, groups, render.groups())
+        chosen = self._pass_list(depsgraph, groups, render.groups())
         show_tiles = not bpy.app.background
         stopped, tiles_shown = False, 0.0
         while True:
@@ -229,10 +218,10 @@ class LumicutEngine(bpy.types.RenderEngine):
                 tiles_shown = time.perf_counter()
                 deadline = tiles_shown + 0.1
                 while time.perf_counter() < deadline and not self.is_stopped() and (tile := render.next_tile()) is not None:
-                    self._write(render, depsgraph, passes, crop, tile, height)
+                    self._write(render, depsgraph, chosen, crop, tile, height)
         if self.is_stopped():
             raise Stopped
-        self._write(render, depsgraph, passes, crop, crop, height)
+        self._write(render, depsgraph, chosen, crop, crop, height)
         self.update_progress(1.0)
 
     def _progress(self, status, phase):
@@ -251,41 +240,30 @@ class LumicutEngine(bpy.types.RenderEngine):
         return f"pass {number}{error}, {phase}", min(1.0, share)
 
     def _pass_list(self, depsgraph, groups=(), lit=()):
-        """[(pass name, channel or None for black)] beside Combined. `groups`: names of light groups, from number 1;
+        """[(pass name, what fills it, or None for black)] beside Combined. `groups`: names of light groups, from number 1;
         `lit`: numbers of those that something emits into."""
         layer = depsgraph.view_layer_eval
-        chosen = [(name, channel) for name, channel, wanted in
-                  (("Depth", "depth", layer.use_pass_z), ("Normal", "normal", layer.use_pass_normal),
-                   ("Position", "position", getattr(layer, "use_pass_position", False))) if wanted]
-        for channel, (name, prop, _, _, letters, _) in properties.PASSES.items():
-            if getattr(layer.lumicut, prop):
-                self.add_pass(name, len(letters), letters, layer=layer.name)
-                chosen.append((name, channel))
+        chosen = passes.wanted(layer)
+        for name, letters, _, _ in passes.added(chosen):
+            self.add_pass(name, len(letters), letters, layer=layer.name)
+        chosen = [(name, source) for name, _, _, source in chosen]
         for number, group in enumerate(groups, 1):
             self.add_pass(properties.GROUP_PASS + group, 3, "RGB", layer=layer.name)
             chosen.append((properties.GROUP_PASS + group, f"radiance.{number}" if number in lit else None))
         return chosen
 
-    def _write(self, render, depsgraph, passes, crop, tile, height):
+    def _write(self, render, depsgraph, chosen, crop, tile, height):
         """A finished rectangle into the render result, which counts from the border's lower left corner."""
         x0, y0, x1, y1 = tile
-        result = self.begin_result(x0 - crop[0], crop[3] - y1, x1 - x0, y1 - y0, layer=depsgraph.view_layer_eval.name)
+        view, camera = self._view
+        result = self.begin_result(x0 - crop[0], crop[3] - y1, x1 - x0, y1 - y0, layer=depsgraph.view_layer_eval.name, view=view)
         try:
             found = result.layers[0].passes
-            radiance, alpha = render.read("radiance", tile), render.read("alpha", tile)
-            combined = np.ones(radiance.shape[:2] + (4,), np.float32)
-            combined[..., :3] = radiance
-            if depsgraph.scene_eval.render.film_transparent:
-                combined[..., 3:] = alpha
-            write_pass(found["Combined"], combined)
-            for name, channel in passes:
+            filler = passes.Filler(render, depsgraph.scene_eval, camera, tile)
+            for name, source in [("Combined", "combined"), *chosen]:
                 target = found.get(name)
-                if target is None or channel is None:
-                    continue
-                pixels = render.read(channel, tile)
-                if channel == "depth":
-                    pixels = np.where(alpha > 0, pixels, np.float32(NO_DEPTH))
-                write_pass(target, pixels)
+                if target is not None and source is not None:
+                    passes.write_pass(target, filler.fill(source))
         finally:
             self.end_result(result)
 
@@ -295,15 +273,8 @@ class LumicutEngine(bpy.types.RenderEngine):
 
     def update_render_passes(self, scene=None, renderlayer=None):
         self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
-        for name, wanted, letters, kind in (
-                ("Depth", renderlayer.use_pass_z, "Z", "VALUE"),
-                ("Normal", renderlayer.use_pass_normal, "XYZ", "VECTOR"),
-                ("Position", getattr(renderlayer, "use_pass_position", False), "XYZ", "VECTOR")):
-            if wanted:
-                self.register_pass(scene, renderlayer, name, len(letters), letters, kind)
-        for name, prop, _, _, letters, kind in properties.PASSES.values():
-            if getattr(renderlayer.lumicut, prop):
-                self.register_pass(scene, renderlayer, name, len(letters), letters, kind)
+        for name, letters, kind, _ in passes.wanted(renderlayer):
+            self.register_pass(scene, renderlayer, name, len(letters), letters, kind)
         for group in getattr(renderlayer, "lightgroups", ()):
             self.register_pass(scene, renderlayer, properties.GROUP_PASS + group.name, 3, "RGB", "COLOR")
 

@@ -226,6 +226,7 @@ class LUMICUT_PT_passes(Panel, bpy.types.Panel):
         column = layout.column(heading="Data", align=True)
         column.prop(layer, "use_pass_combined")
         column.prop(layer, "use_pass_z")
+        column.prop(layer, "use_pass_mist")
         column.prop(layer, "use_pass_normal")
         column.prop(layer, "use_pass_position")
         column.prop(layer.lumicut, "use_pass_albedo")
@@ -288,6 +289,9 @@ class LUMICUT_PT_film(Panel, bpy.types.Panel):
 
     def draw(self, context):
         self.layout.use_property_split = True
+        of_cycles = getattr(context.scene, "cycles", None)
+        if of_cycles is not None:  # it belongs to Cycles, and counts here too
+            self.layout.prop(of_cycles, "film_exposure", text="Exposure")
         self.layout.prop(context.scene.render, "film_transparent", text="Transparent")
 
 

@@ -13,7 +13,7 @@ import gpu
 import numpy as np
 from gpu_extras.presets import draw_texture_2d
 
-from . import collect, library, properties, runtime, sky
+from . import cameras, collect, library, passes, properties, runtime, sky
 from .images import Images
 from .report import Report
 
@@ -78,7 +78,7 @@ class Session:
             if "vpls" in values:
                 values["vpls"] = str(settings.viewport_lights)
             levels.append((divisor, name, values))
-        return {"levels": levels, "tracing": properties.tracing_of(settings), "threads": settings.threads}
+        return {"levels": levels, "exposure": passes.exposure(settings.id_data), "tracing": properties.tracing_of(settings), "threads": settings.threads}
 
     def draw(self, engine, context, depsgraph):
         region = context.region
@@ -86,7 +86,7 @@ class Session:
         if self.data is None and not self.message.startswith("collecting failed"):
             self.update(engine, context, depsgraph)
         if self.data is not None and runtime.loaded() is not None:
-            camera = collect.viewport_camera(context, width, height)
+            camera = cameras.viewport_camera(context, width, height)
             view = (bytes(camera), width, height)
             if view != self.view:
                 new_scene = self.view is None
@@ -206,7 +206,7 @@ class Session:
                 self._guarded(render, lambda: render.wait(library.FOREVER))
                 radiance, alpha = render.read("radiance"), render.read("alpha")
             picture = np.ones((height, width, 4), np.float32)
-            picture[..., :3] = radiance[::-1]
+            picture[..., :3] = radiance[::-1] * settings["exposure"]
             if scene_is_transparent(self.data):
                 picture[..., 3] = alpha[::-1, :, 0]
             with self.condition:

@@ -10,7 +10,7 @@ import bpy
 
 import helpers as h
 import lumicut_blender
-from lumicut_blender import engine, library, properties, runtime
+from lumicut_blender import library, passes, properties, runtime
 
 PACKAGE = pathlib.Path(lumicut_blender.__file__).resolve().parent
 
@@ -246,6 +246,6 @@ class Passes(unittest.TestCase):
             rect = Rect()
 
         pixels = np.arange(24, dtype=np.float32).reshape(2, 4, 3)
-        engine.write_pass(Pass, pixels)
+        passes.write_pass(Pass, pixels)
         self.assertEqual(len(Rect.calls), 1)
         np.testing.assert_array_equal(Rect.calls[0].reshape(2, 4, 3), pixels[::-1])

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cameras: of frames, of both eyes, of 3D views; and the border that is rendered."""
+import math
+
+import numpy as np
+from mathutils import Matrix
+
+from . import library
+
+
+def rows(matrix):
+    """The upper 3x4 of a matrix, row-major."""
+    return [c for row in matrix[:3] for c in row]
+
+
+def crop_of(render, width, height):
+    """(x0, y0, x1, y1), rows from the top, of the border; the whole where there is none.
+
+    In single precision, as Blender cuts its images: 0.9 of 60 rows is 54, and not 53.999999."""
+    if not render.use_border:
+        return 0, 0, width, height
+
+    def cut(share, size):
+        return int(np.float32(share) * np.float32(size))
+
+    x0, x1 = cut(render.border_min_x, width), cut(render.border_max_x, width)
+    y0, y1 = cut(render.border_min_y, height), cut(render.border_max_y, height)
+    x0, y0 = min(max(x0, 0), width - 1), min(max(y0, 0), height - 1)
+    x1, y1 = max(min(x1, width), x0 + 1), max(min(y1, height), y0 + 1)
+    return x0, height - y1, x1, height - y0
+
+
+def views_of(engine, scene, report):
+    """[(name of the view, library.Camera)]: one without a name, or what stereoscopy asks for. The views share all else."""
+    def camera_now():
+        camera = engine.camera_override or scene.camera
+        if camera is None:
+            raise library.Error(library.INVALID_STATE, "the scene has no camera")
+        return camera
+
+    if engine.is_preview or not scene.render.use_multiview:
+        return [("", convert_camera(camera_now(), scene, report))]
+    result = engine.begin_result(0, 0, 1, 1)
+    names = [view.name for view in result.views]
+    engine.end_result(result, cancel=True)
+    views = []
+    for name in names:
+        engine.active_view_set(name)
+        camera = camera_now()
+        if camera.data.type == "PANO" and camera.data.stereo.use_spherical_stereo:
+            report.note(camera.name, "Spherical stereo taken as plain")
+        views.append((name, convert_camera(camera, scene, report, Matrix(engine.camera_model_matrix(camera)),
+                                           engine.camera_shift_x(camera))))
+    return views
+
+
+def fit(render, camera_data):
+    """(horizontal, sensor width along the fitted side, aspect-corrected width and height)."""
+    width = render.resolution_x * render.pixel_aspect_x
+    height = render.resolution_y * render.pixel_aspect_y
+    mode = camera_data.sensor_fit
+    horizontal = mode == "HORIZONTAL" or (mode == "AUTO" and width >= height)
+    return horizontal, camera_data.sensor_height if mode == "VERTICAL" else camera_data.sensor_width, width, height
+
+
+def convert_camera(camera, scene, report, matrix=None, shift_x=None):
+    """A library.Camera of a camera object, as the scene's resolution and pixel aspect frame it.
+
+    `matrix`, `shift_x`: of one eye, in place of the camera's own."""
+    data = camera.data
+    horizontal, sensor, width, height = fit(scene.render, data)
+    out = library.Camera()
+    m = (camera.matrix_world if matrix is None else matrix).normalized()
+    shift_x = data.shift_x if shift_x is None else shift_x
+    out.to_world[:] = rows(m)
+    # What is given along the fitted side, in image heights.
+    heights = width / height if horizontal else 1.0
+    out.pixel_aspect = scene.render.pixel_aspect_x / scene.render.pixel_aspect_y
+    out.shift[:] = [shift_x * heights, data.shift_y * heights]
+    out.near_clip, out.far_clip = data.clip_start, data.clip_end
+    if data.type == "ORTHO":
+        out.orthographic = 1
+        out.height = data.ortho_scale / heights
+    else:
+        if data.type == "PANO":
+            report.note(camera.name, "Panoramic cameras taken as perspective ones")
+        out.fov_y = 2 * math.atan(sensor / (2 * data.lens) / heights)
+    if data.dof.use_dof:
+        distance = data.dof.focus_distance
+        if data.dof.focus_object is not None:
+            offset = data.dof.focus_object.matrix_world.translation - m.translation
+            distance = abs(offset @ m.col[2].to_3d())
+        stop = max(data.dof.aperture_fstop, 1e-5)
+        if distance > 0:
+            out.lens_radius = (1.0 if data.type == "ORTHO" else data.lens * 1e-3) / (2 * stop)
+            out.focus_distance = distance
+        if data.dof.aperture_blades > 2 or abs(data.dof.aperture_ratio - 1) > 1e-3:
+            report.note(camera.name, "Shapes of the aperture taken as a disk")
+    return out
+
+
+def viewport_camera(context, width, height):
+    """A library.Camera of a 3D view of width x height pixels."""
+    region, space = context.region_data, context.space_data
+    out = library.Camera(pixel_aspect=1.0)
+    out.to_world[:] = rows(region.view_matrix.inverted_safe().normalized())
+    projection = region.window_matrix  # the view's own: lens, zoom, offset of camera views, all in one
+    out.orthographic = 0 if region.is_perspective else 1
+    half_width, half_height = 1 / projection[0][0], 1 / projection[1][1]
+    if region.is_perspective:
+        out.fov_y = 2 * math.atan(half_height)
+        out.shift[:] = [projection[0][2] * half_width / (2 * half_height), projection[1][2] / 2]
+        out.near_clip, out.far_clip = space.clip_start, space.clip_end
+    else:
+        out.height = 2 * half_height
+        out.shift[:] = [-projection[0][3] * half_width / (2 * half_height), -projection[1][3] / 2]
+        # Orthographic views look from within: begin far behind.
+        back = np.array(region.view_matrix.inverted_safe())[:3, 2]
+        for k in range(3):
+            out.to_world[4 * k + 3] += float(back[k]) * space.clip_end * 0.5
+    return out

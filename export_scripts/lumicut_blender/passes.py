@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Passes of a view layer: which it asks for, what the library's channels give of them, what is left out or refused."""
+import bpy
+import numpy as np
+
+from . import library, properties
+
+FLAT_RECTS = bpy.app.version >= (4, 1, 0)
+NO_DEPTH = 1e10  # as Cycles has it where nothing is hit
+
+# Properties of view layers, and of what Cycles adds to them, for passes that are not there: shown by their names.
+LEFT_OUT = {
+    "use_pass_vector": "Vector", "use_pass_uv": "UV", "use_pass_object_index": "Object Index",
+    "use_pass_material_index": "Material Index", "use_pass_shadow": "Shadow", "use_pass_ambient_occlusion": "Ambient Occlusion",
+    "use_pass_emit": "Emission", "use_pass_environment": "Environment", "use_pass_diffuse_direct": "Diffuse Direct",
+    "use_pass_diffuse_indirect": "Diffuse Indirect", "use_pass_diffuse_color": "Diffuse Color",
+    "use_pass_glossy_direct": "Glossy Direct", "use_pass_glossy_indirect": "Glossy Indirect",
+    "use_pass_glossy_color": "Glossy Color", "use_pass_transmission_direct": "Transmission Direct",
+    "use_pass_transmission_indirect": "Transmission Indirect", "use_pass_transmission_color": "Transmission Color",
+    "use_pass_cryptomatte_object": "Cryptomatte Object", "use_pass_cryptomatte_material": "Cryptomatte Material",
+    "use_pass_cryptomatte_asset": "Cryptomatte Asset", "use_pass_volume_direct": "Volume Direct",
+    "use_pass_volume_indirect": "Volume Indirect", "use_pass_shadow_catcher": "Shadow Catcher",
+}
+
+
+def write_pass(render_pass, pixels):
+    """pixels (h, w, channels), top row first, into a pass that counts rows from the bottom."""
+    pixels = np.ascontiguousarray(pixels[::-1], np.float32)
+    render_pass.rect.foreach_set(pixels.reshape(-1) if FLAT_RECTS else pixels.reshape(-1, pixels.shape[2]))
+
+
+def of_cycles(owner, name, otherwise):
+    """A property that Cycles keeps at scenes and view layers; files have it where they were made for Cycles."""
+    return getattr(getattr(owner, "cycles", None), name, otherwise)
+
+
+def exposure(scene):
+    """Factor of all that is light in an image (Film > Exposure)."""
+    return of_cycles(scene, "film_exposure", 1.0)
+
+
+def wanted(layer):
+    """[(pass name, letters of its channels, kind, what fills it)] of a view layer, beside Combined and light groups.
+    What fills it is a channel of the library or a method of Filler."""
+    chosen = [("Depth", "Z", "VALUE", "depth")] if layer.use_pass_z else []
+    if layer.use_pass_mist:
+        chosen.append(("Mist", "Z", "VALUE", "mist"))
+    if layer.use_pass_normal:
+        chosen.append(("Normal", "XYZ", "VECTOR", "normal"))
+    if getattr(layer, "use_pass_position", False):
+        chosen.append(("Position", "XYZ", "VECTOR", "position"))
+    for channel, (name, prop, _, _, letters, kind) in properties.PASSES.items():
+        if getattr(layer.lumicut, prop):
+            chosen.append((name, letters, kind, channel))
+    if of_cycles(layer, "denoising_store_passes", False):
+        chosen += [("Noisy Image", "RGBA", "COLOR", "combined"), ("Denoising Normal", "XYZ", "VECTOR", "camera_normal"),
+                   ("Denoising Albedo", "RGB", "COLOR", "albedo"), ("Denoising Depth", "Z", "VALUE", "ray_length")]
+    return chosen
+
+
+def added(chosen):
+    """Of wanted() those that Blender does not add by itself."""
+    return [row for row in chosen if row[0] not in {"Depth", "Mist", "Normal", "Position"}]
+
+
+def note_left_out(layer, report):
+    own = getattr(layer, "cycles", None)
+    for prop, name in LEFT_OUT.items():
+        if getattr(layer, prop, False) or getattr(own, prop, False):
+            report.note(name, "Passes left out")
+    if len(getattr(layer, "aovs", ())) > 0:
+        report.note("AOV", "Passes left out")
+
+
+def of_compositor(scene, layer_name):
+    """Names of the layer's passes that the scene's compositor makes its image or files from."""
+    tree = getattr(scene, "compositing_node_group", None) or (scene.node_tree if getattr(scene, "use_nodes", False) else None)
+    if tree is None or not scene.render.use_compositing:
+        return set()
+    found, seen = set(), set()
+    todo = [n for n in tree.nodes if n.type in {"COMPOSITE", "OUTPUT_FILE", "GROUP_OUTPUT"} and not n.mute]
+    while todo:
+        node = todo.pop()
+        if node in seen:
+            continue
+        seen.add(node)
+        for link in (link for socket in node.inputs for link in socket.links if not getattr(link, "is_muted", False)):
+            source = link.from_node
+            if source.type == "R_LAYERS":
+                if source.scene in {None, scene} and source.layer == layer_name:
+                    found.add(link.from_socket.name)
+            else:
+                todo.append(source)
+    return found
+
+
+def check_compositor(scene, layer):
+    """An error where the compositor needs a pass that is not there: it would take it for white or black."""
+    there = {"Image", "Combined", "Alpha"} | {row[0] for row in wanted(layer)}
+    there |= {properties.GROUP_PASS + group.name for group in getattr(layer, "lightgroups", ())}
+    missing = sorted(of_compositor(scene, layer.name) - there)
+    if missing:
+        text = f"the compositor uses passes of {layer.name} that are not rendered: {', '.join(missing)}"
+        raise library.Error(library.UNSUPPORTED, text)
+
+
+class Filler:
+    """Pixels of one rectangle of a render. `camera`: a library.Camera."""
+
+    def __init__(self, render, scene, camera, tile):
+        self.render, self.scene, self.camera, self.tile = render, scene, camera, tile
+        self._read, self._exposure = {}, exposure(scene)
+        self.hit = self.channel("alpha") > 0
+
+    def channel(self, name):
+        if name not in self._read:
+            self._read[name] = self.render.read(name, self.tile)
+        return self._read[name]
+
+    def fill(self, source):
+        own = getattr(self, source, None)
+        return own() if own is not None else self.lit(source) if source.startswith("radiance") or source == "error" \
+            else self.channel(source)
+
+    def lit(self, channel):
+        pixels = self.channel(channel)
+        return pixels if self._exposure == 1 else pixels * np.float32(self._exposure)
+
+    def combined(self):
+        radiance = self.lit("radiance")
+        out = np.ones(radiance.shape[:2] + (4,), np.float32)
+        out[..., :3] = radiance
+        if self.scene.render.film_transparent:
+            out[..., 3:] = self.channel("alpha")
+        return out
+
+    def depth(self):
+        return np.where(self.hit, self.channel("depth"), np.float32(NO_DEPTH))
+
+    def distance(self):
+        """From the camera's place; orthographic: from its plane. 0 where nothing is hit."""
+        if self.camera.orthographic:
+            return self.channel("depth")
+        place = np.array(self.camera.to_world[3::4], np.float32)
+        return np.where(self.hit, np.linalg.norm(self.channel("position") - place, axis=-1, keepdims=True), 0)
+
+    def mist(self):
+        """As Cycles has it: from 0 at the start to 1 at start + depth, and behind everything."""
+        world = self.scene.world
+        start, depth, falloff = (world.mist_settings.start, world.mist_settings.depth, world.mist_settings.falloff) \
+            if world is not None else (0.0, 100.0, "LINEAR")
+        share = np.clip((self.distance() - start) / max(depth, 1e-6), 0, 1)
+        share = share ** {"QUADRATIC": 2.0, "LINEAR": 1.0, "INVERSE_QUADRATIC": 0.5}[falloff]
+        alpha = self.channel("alpha")  # what is seen through holes lies behind everything
+        return np.where(self.hit, share * alpha + 1 - alpha, 1)
+
+    def ray_length(self):
+        """Of Cycles' denoiser: the distance beyond the near clipping plane."""
+        depth = self.channel("depth")
+        return self.distance() * (1 - self.camera.near_clip / np.maximum(depth, max(self.camera.near_clip, 1e-30)))
+
+    def camera_normal(self):
+        """Of Cycles' denoiser: right, up, and away from the viewer."""
+        axes = np.array(self.camera.to_world, np.float32).reshape(3, 4)[:, :3]
+        return self.channel("normal") @ (axes * np.array((1, 1, -1), np.float32))
