@@ -9,7 +9,8 @@ from mathutils import Euler
 
 from . import ies, library, sky
 from .images import Picture
-from .nodes import Evaluator, Mapping, Value
+from .mappings import Mapping
+from .nodes import Evaluator, Value
 from .report import Report
 from .scene_data import Profile
 
