@@ -7,7 +7,7 @@ each set of materials; its instances are transforms.
 import bpy
 import numpy as np
 
-from . import library, lights
+from . import library, lights, soft_spots
 from .cameras import rows
 from .materials import Materials
 from .report import Report
@@ -234,6 +234,8 @@ class Collector:
         for name, sun in suns:
             sun.group = self._group(world)
             self.scene.lights.append((name, sun))
+        self.scene.lamps = len(self.scene.lights)
+        self.scene.lights = soft_spots.spread_out(self.scene.lights)
         if self.scene.environment is not None:
             self.scene.environment.group = self._group(world)
         if self.scene.environment is not None and scene.render.film_transparent:

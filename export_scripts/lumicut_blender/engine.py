@@ -136,7 +136,7 @@ class LumicutEngine(bpy.types.RenderEngine):
         with library.Scene(device, **properties.tracing_of(settings)) as target, library.Integrator(device, integrator_name) as integrator:
             data.upload(target, self._check)
             triangles, instances = data.triangles(), sum(len(m.transforms) for m in data.meshes)
-            lamps, meshes, groups = len(data.lights), len(data.meshes), data.groups
+            lamps, meshes, groups = data.lamps, len(data.meshes), data.groups
             data = None  # the library has its own copy now
             for name, value in parameters.items():
                 integrator.set(name, value)
