@@ -9,6 +9,8 @@ import numpy as np
 
 import helpers as h
 
+LINEAR = "Linear" if h.VERSION < (4, 0, 0) else "Linear Rec.709"
+
 
 def image_of(name, texels, space="sRGB", as_float=False):
     """(h, w, 3 or 4) texels, top row first, as they are stored; packed."""
@@ -76,7 +78,7 @@ class Images(unittest.TestCase):
         for as_float in (False, True):
             with self.subTest(as_float=as_float):
                 self.setUp()
-                image = image_of("a", halves((.8, .6, .4, .25), (.8, .6, .4, 1)), "Linear" if as_float else "sRGB", as_float)
+                image = image_of("a", halves((.8, .6, .4, .25), (.8, .6, .4, 1)), LINEAR if as_float else "sRGB", as_float)
                 m, texture, _ = self.textured(image)
                 output = next(n for n in m.node_tree.nodes if n.type == "OUTPUT_MATERIAL")
                 mix, dark = (m.node_tree.nodes.new("ShaderNode" + kind) for kind in ("MixShader", "Emission"))

@@ -146,8 +146,10 @@ class Views(unittest.TestCase):
 
     def test_passes_that_a_compositor_needs_and_that_are_not_there_are_an_error_by_name(self):
         self.layer.use_pass_shadow = self.layer.use_pass_mist = True
-        tree = self.compositor("Mist", "Shadow", "AO")
-        with self.assertRaisesRegex(RuntimeError, "not rendered: AO, Shadow"):
+        # 3.4 has sockets of passes that nobody chose, which 4.3 has not.
+        names = ("Mist", "AO", "Shadow") if h.VERSION < (4, 0, 0) else ("Mist", "Shadow")
+        tree = self.compositor(*names)
+        with self.assertRaisesRegex(RuntimeError, f"not rendered: {', '.join(names[1:])}"):
             self.render()
         self.scene.render.use_compositing = False
         self.render()
