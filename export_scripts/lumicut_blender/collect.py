@@ -7,7 +7,7 @@ each set of materials; its instances are transforms.
 import bpy
 import numpy as np
 
-from . import library, lights, soft_spots
+from . import library, lights, soft_spots, worlds
 from .cameras import rows
 from .materials import Materials
 from .report import Report
@@ -230,7 +230,7 @@ class Collector:
         scene = self.depsgraph.scene_eval
         bake = (lambda world: self.bake(world, scene.frame_current, self.check)) if self.bake is not None else None
         world = (getattr(layer, "world_override", None) or scene.world) if layer.use_sky else None
-        self.scene.environment, suns = lights.convert_world(world, self.materials, self.report, bake)
+        self.scene.environment, suns, backdrop = worlds.convert_world(world, self.materials, self.report, bake)
         for name, sun in suns:
             sun.group = self._group(world)
             self.scene.lights.append((name, sun))
@@ -238,7 +238,9 @@ class Collector:
         self.scene.lights = soft_spots.spread_out(self.scene.lights)
         if self.scene.environment is not None:
             self.scene.environment.group = self._group(world)
-        if self.scene.environment is not None and scene.render.film_transparent:
+        self.scene.transparent = scene.render.film_transparent
+        self.scene.backdrop = None if self.scene.transparent else backdrop
+        if self.scene.environment is not None and (self.scene.transparent or backdrop is not None):
             self.scene.environment.flags |= library.HIDDEN
         if scene.render.use_motion_blur:
             self.report.note(scene.name, "Motion blur left out")
