@@ -221,6 +221,8 @@ class Collector:
                 if light is not None:
                     light.group = self._group(ob)
                     self.scene.lights.append((ob.name, light))
+                if not all(getattr(ob, "visible_" + ray) for ray in ("diffuse", "glossy", "transmission")):
+                    self.report.note(ob.name, "Lamps hidden from some rays, which light all here")
                 if ob.visible_camera:
                     self.report.note(ob.name, "Lamps that the camera should see, which it does not")
             elif ob.type in LEFT_OUT:
@@ -240,7 +242,13 @@ class Collector:
             self.scene.environment.group = self._group(world)
         self.scene.transparent = scene.render.film_transparent
         self.scene.backdrop = None if self.scene.transparent else backdrop
-        if self.scene.environment is not None and (self.scene.transparent or backdrop is not None):
+        seen = getattr(world, "cycles_visibility", None)
+        hidden = seen is not None and not seen.camera
+        if hidden:
+            self.scene.backdrop = None
+        if seen is not None and not all(getattr(seen, ray) for ray in ("diffuse", "glossy", "transmission")):
+            self.report.note(world.name, "Worlds hidden from some rays, which all see here")
+        if self.scene.environment is not None and (self.scene.transparent or backdrop is not None or hidden):
             self.scene.environment.flags |= library.HIDDEN
         if scene.render.use_motion_blur:
             self.report.note(scene.name, "Motion blur left out")

@@ -258,3 +258,12 @@ class Backdrops(unittest.TestCase):
             h.set_lumicut("exhaustive", vpls=50)
             h.render()
         self.assertIn("Worlds that differ by ray, taken as for lighting: World (Light Path)", h.last_notes())
+
+    def test_a_world_hidden_from_the_camera_lights_before_black(self):
+        self.background.inputs["Color"].default_value = (0.2, 0.4, 0.9, 1)
+        self.scene.world.cycles_visibility.camera = False
+        self.assertEqual(self.compare(), [])
+        self.scene.world.cycles_visibility.diffuse = False
+        with h.quiet():
+            h.render()
+        self.assertEqual(h.last_notes(), ["Worlds hidden from some rays, which all see here: World"])
