@@ -308,10 +308,13 @@ class Collector:
             self.instances += 1
 
     def _check_flags(self, ob):
-        for flag, text in (("is_holdout", "Holdouts taken as ordinary objects"),
-                           ("is_shadow_catcher", "Shadow catchers taken as ordinary objects")):
-            if getattr(ob, flag, False):
-                self.report.note(ob.name, text)
+        layer = self.depsgraph.view_layer_eval
+        if ob.is_holdout or ob.holdout_get(view_layer=layer):  # its own, or its collection's
+            self.report.note(ob.name, "Holdouts taken as ordinary objects")
+        if ob.indirect_only_get(view_layer=layer):
+            self.report.note(ob.name, "Objects of Indirect Only collections, which the camera sees here")
+        if ob.is_shadow_catcher:
+            self.report.note(ob.name, "Shadow catchers taken as ordinary objects")
         if not all(getattr(ob, "visible_" + ray) for ray in RAYS):
             self.report.note(ob.name, "Objects hidden from some rays, which all see here")
 
