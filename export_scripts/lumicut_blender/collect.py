@@ -7,7 +7,7 @@ each set of materials; its instances are transforms.
 import bpy
 import numpy as np
 
-from . import library, lights
+from . import library, lights, soft_spots, worlds
 from .cameras import rows
 from .materials import Materials
 from .report import Report
@@ -221,6 +221,8 @@ class Collector:
                 if light is not None:
                     light.group = self._group(ob)
                     self.scene.lights.append((ob.name, light))
+                if not all(getattr(ob, "visible_" + ray) for ray in ("diffuse", "glossy", "transmission")):
+                    self.report.note(ob.name, "Lamps hidden from some rays, which light all here")
                 if ob.visible_camera:
                     self.report.note(ob.name, "Lamps that the camera should see, which it does not")
             elif ob.type in LEFT_OUT:
@@ -230,13 +232,23 @@ class Collector:
         scene = self.depsgraph.scene_eval
         bake = (lambda world: self.bake(world, scene.frame_current, self.check)) if self.bake is not None else None
         world = (getattr(layer, "world_override", None) or scene.world) if layer.use_sky else None
-        self.scene.environment, suns = lights.convert_world(world, self.materials, self.report, bake)
+        self.scene.environment, suns, backdrop = worlds.convert_world(world, self.materials, self.report, bake)
         for name, sun in suns:
             sun.group = self._group(world)
             self.scene.lights.append((name, sun))
+        self.scene.lamps = len(self.scene.lights)
+        self.scene.lights = soft_spots.spread_out(self.scene.lights)
         if self.scene.environment is not None:
             self.scene.environment.group = self._group(world)
-        if self.scene.environment is not None and scene.render.film_transparent:
+        self.scene.transparent = scene.render.film_transparent
+        self.scene.backdrop = None if self.scene.transparent else backdrop
+        seen = getattr(world, "cycles_visibility", None)
+        hidden = seen is not None and not seen.camera
+        if hidden:
+            self.scene.backdrop = None
+        if seen is not None and not all(getattr(seen, ray) for ray in ("diffuse", "glossy", "transmission")):
+            self.report.note(world.name, "Worlds hidden from some rays, which all see here")
+        if self.scene.environment is not None and (self.scene.transparent or backdrop is not None or hidden):
             self.scene.environment.flags |= library.HIDDEN
         if scene.render.use_motion_blur:
             self.report.note(scene.name, "Motion blur left out")
@@ -296,10 +308,13 @@ class Collector:
             self.instances += 1
 
     def _check_flags(self, ob):
-        for flag, text in (("is_holdout", "Holdouts taken as ordinary objects"),
-                           ("is_shadow_catcher", "Shadow catchers taken as ordinary objects")):
-            if getattr(ob, flag, False):
-                self.report.note(ob.name, text)
+        layer = self.depsgraph.view_layer_eval
+        if ob.is_holdout or ob.holdout_get(view_layer=layer):  # its own, or its collection's
+            self.report.note(ob.name, "Holdouts taken as ordinary objects")
+        if ob.indirect_only_get(view_layer=layer):
+            self.report.note(ob.name, "Objects of Indirect Only collections, which the camera sees here")
+        if ob.is_shadow_catcher:
+            self.report.note(ob.name, "Shadow catchers taken as ordinary objects")
         if not all(getattr(ob, "visible_" + ray) for ray in RAYS):
             self.report.note(ob.name, "Objects hidden from some rays, which all see here")
 

@@ -118,6 +118,8 @@ class LumicutEngine(bpy.types.RenderEngine):
             factor = passes.exposure(scene)
             if factor != 1:
                 report.note(f"{factor:g}", "Film exposure, which scene files do not have")
+            if data.backdrop is not None:
+                report.note(scene.world.name, "Worlds that the camera sees otherwise, black in scene files' images")
             if len(views) > 1:
                 report.note(views[0][0], "Of several views the first alone is exported")
         self._tell(report)
@@ -136,7 +138,11 @@ class LumicutEngine(bpy.types.RenderEngine):
         with library.Scene(device, **properties.tracing_of(settings)) as target, library.Integrator(device, integrator_name) as integrator:
             data.upload(target, self._check)
             triangles, instances = data.triangles(), sum(len(m.transforms) for m in data.meshes)
-            lamps, meshes, groups = len(data.lights), len(data.meshes), data.groups
+            self._backdrop = None
+            if data.backdrop is not None:
+                self._backdrop = (lambda camera, tile, seen=data.backdrop.seen: seen(camera, width, height, tile),
+                                  data.environment.group if data.environment is not None else 0)
+            lamps, meshes, groups = data.lamps, len(data.meshes), data.groups
             data = None  # the library has its own copy now
             for name, value in parameters.items():
                 integrator.set(name, value)
@@ -259,7 +265,7 @@ class LumicutEngine(bpy.types.RenderEngine):
         result = self.begin_result(x0 - crop[0], crop[3] - y1, x1 - x0, y1 - y0, layer=depsgraph.view_layer_eval.name, view=view)
         try:
             found = result.layers[0].passes
-            filler = passes.Filler(render, depsgraph.scene_eval, camera, tile)
+            filler = passes.Filler(render, depsgraph.scene_eval, camera, tile, *(self._backdrop or ()))
             for name, source in [("Combined", "combined"), *chosen]:
                 target = found.get(name)
                 if target is not None and source is not None:

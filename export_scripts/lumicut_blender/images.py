@@ -29,11 +29,28 @@ class Picture:
             return np.ascontiguousarray(pixels), self.flags | (library.SRGB if srgb else 0)
         return np.ascontiguousarray(self._linear, np.float32), self.flags
 
+    def texels(self):
+        """As stored, or linear where it was made by nodes."""
+        return self._stored()[0] if self._stored is not None else self._linear
+
+    def shape(self):
+        return self.texels().shape[:2]
+
+    def is_srgb(self):
+        return self._stored is not None and self._stored()[1]
+
+    def ends(self):
+        """Whether it does not repeat."""
+        return bool(self.flags & library.CLAMP)
+
+    def moved(self, mapping, key):
+        return Picture(self.name, key, mapping, self.flags, self._stored, self._linear)
+
     def is_byte(self):
         return self._stored is not None and self._stored()[0].dtype == np.uint8
 
     def is_grey(self):
-        texels = self._stored()[0] if self._stored is not None else self._linear
+        texels = self.texels()
         return texels.shape[2] == 1 or (texels[..., :1] == texels[..., 1:3]).all()
 
     def linear(self):

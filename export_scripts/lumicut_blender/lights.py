@@ -1,16 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lamps and the world, in the units of the Blender that runs (docs/units.md): each type agrees with Cycles to 1 %."""
+"""Lamps, in the units of the Blender that runs (docs/units.md): each type agrees with Cycles to 1 %."""
 import math
 import os
 
 import bpy
 import numpy as np
-from mathutils import Euler
 
-from . import ies, library, sky
-from .images import Picture
-from .nodes import Evaluator, Mapping, Value
-from .report import Report
+from . import ies, library
+from .directions import Directions
+from .nodes import Value
 from .scene_data import Profile
 
 TYPES = {"POINT": library.POINT, "SPOT": library.SPOT, "SUN": library.SUN}
@@ -25,30 +23,6 @@ SPOT_WITHOUT_COSINE = (4, 0, 0)
 # Measured: 3.4.1 interpolates IES files around the full circle, 4.3.2 takes 0 beyond 0 and 360 degrees, which makes them
 # up to 1/16 brighter in their first and last interval, and files that are the same all around 1/8.
 IES_WITHOUT_WRAP = (4, 3, 0)
-
-
-class Directions(Evaluator):
-    """Follows a vector input that is a direction, turned by Mapping nodes."""
-
-    plain = ()  # (type, output) of nodes that give the direction as it is
-
-    def direction(self, socket, stack):
-        """The rotation that an input applies to the direction; None: not followed."""
-        node, output, stack = self.source(socket, stack)
-        if node is None or (node.type, output.name) in self.plain:
-            return np.eye(3)
-        if node.type == "MAPPING":
-            inner = self.direction(node.inputs["Vector"], stack)
-            own_values = {n: node.inputs[n] for n in ("Location", "Rotation", "Scale") if n in node.inputs}
-            if inner is None or any(s.is_linked for s in own_values.values()):
-                return None
-            if "Location" in own_values and any(abs(c) > 1e-6 for c in own_values["Location"].default_value):
-                self.note("location", "Moves and scales of directions left out")
-            if any(abs(c - 1) > 1e-6 for c in own_values["Scale"].default_value):
-                self.note("scale", "Moves and scales of directions left out")
-            turn = np.array(Euler(own_values["Rotation"].default_value, "XYZ").to_matrix())
-            return (turn.T if node.vector_type == "TEXTURE" else turn) @ inner
-        return None
 
 
 class LampReader(Directions):
@@ -263,110 +237,3 @@ def convert_light(name, light, matrix, images, report, profiles):
             return None
         out.angle, out.blend, out.spot_cosine = 0.0, 0.0, 0
     return out
-
-
-BY_RAY = "Worlds that differ by ray, taken as for lighting"
-WORLD_VOLUME = "World volumes left out"
-
-
-def convert_world(world, materials, report, bake=None):
-    """(library.Environment, or None for black; [(name, library.Light)] of suns that were in it).
-
-    `bake(world)` renders what cannot be read, see sky.py: it gives None where that is not to be had now."""
-    if world is None:
-        return None, []
-    own = Report()
-    colour, rotation = _read_world(world, materials, own)
-    baked, suns = None, []
-    if bake is not None and any(text not in {BY_RAY, WORLD_VOLUME} for text in own.texts()):
-        try:
-            baked = bake(world)
-        except sky.BakeError as reason:
-            report.note(f"{world.name} ({reason})", "Worlds that Cycles could not render into an image")
-    if baked is None:
-        report.take(own)
-    else:
-        height, width = baked.pixels.shape[:2]
-        report.note(world.name, f"Worlds rendered by Cycles into an image of {width} x {height}")
-        report.take(own, {BY_RAY, WORLD_VOLUME})
-        picture = Picture(f"{world.name} sky", (world.name_full, "baked", id(baked)), Mapping(), 0, linear=baked.pixels)
-        colour, rotation = Value(1, picture if baked.pixels.any() else None), np.eye(3)
-        if colour.picture is None:
-            colour = Value(0)
-        for towards, irradiance, angle in baked.suns:
-            most = float(irradiance.max())
-            sun = library.Light(type=library.SUN, unit=library.WATT, value=most, radius=angle / 2)
-            sun.color[:] = [float(c) / most for c in irradiance]
-            sun.direction[:] = [-float(c) for c in towards]
-            suns.append((f"{world.name} sun", sun))
-    environment = library.Environment()
-    environment.color[:] = [max(0.0, float(c)) for c in colour.factor]
-    if not any(environment.color):
-        return None, suns
-    if colour.picture is not None:
-        environment.texture = materials.picture_number(colour.picture)
-        environment.world_to_map[:] = [float(v) for v in rotation.reshape(9)]
-    return environment, suns
-
-
-def _read_world(world, materials, report):
-    """(radiance, rotation of its image) as the nodes say, where they can be followed."""
-    if not world.use_nodes or world.node_tree is None:
-        return Value([max(0.0, float(c)) for c in world.color]), np.eye(3)
-    reader = WorldReader(world.name, materials.images, report)
-    output = world.node_tree.get_output_node("CYCLES") or world.node_tree.get_output_node("ALL")
-    node, stack = None, ()
-    if output is not None:
-        if output.inputs["Volume"].is_linked:
-            reader.note("", WORLD_VOLUME)
-        node, _, stack = reader.source(output.inputs["Surface"], ())
-    if node is None:
-        return Value(0), np.eye(3)
-    if node.type != "BACKGROUND":
-        reader.note(node.bl_label, "Shaders of worlds other than Background left out")
-        return Value(0), np.eye(3)
-    colour = reader.multiply(reader.value(node.inputs["Color"], stack), reader.value(node.inputs["Strength"], stack))
-    if colour.picture is None:
-        return colour, np.eye(3)
-    return colour, reader.rotation if reader.rotation is not None else np.eye(3)
-
-
-class WorldReader(Directions):
-    """Environment textures, and the rotation that their vector has."""
-
-    plain = (("TEX_COORD", "Generated"), ("TEX_COORD", "Object"), ("NEW_GEOMETRY", "Position"))
-
-    def __init__(self, *arguments):
-        super().__init__(*arguments)
-        self.rotation = None  # not met yet
-
-    def _tex_environment(self, node, output, stack):
-        if node.image is None:
-            self.note(node.name, "Image textures without an image, taken as black")
-            return Value(0)
-        read = self.images.pixels(node.image, node.image_user)
-        if read is None:
-            return Value((1, 0, 1))
-        if node.projection != "EQUIRECTANGULAR":
-            self.note(node.image.name, "Mirror-ball skies, taken as equirectangular")
-        rotation = self.direction(node.inputs["Vector"], stack)
-        if rotation is None:
-            self.note(node.image.name, "Skies on unknown coordinates, taken as unturned")
-        elif self.rotation is not None and not np.allclose(rotation, self.rotation):
-            self.note(node.image.name, "Skies of several rotations, all turned as the first")
-        else:
-            self.rotation = rotation
-
-        def stored():
-            texels, srgb = read
-            return texels[..., :3] if texels.dtype == np.uint8 else np.maximum(texels[..., :3], 0), srgb
-
-        return Value(1, Picture(node.image.name, (self.images.key(node.image, node.image_user), "sky"), Mapping(), 0, stored=stored))
-
-    def _tex_sky(self, node, output, stack):
-        self.note(f"Sky Texture ({node.sky_type.lower()})", "Procedural skies taken as an even pale blue")
-        return Value((0.3, 0.45, 0.7))
-
-    def _light_path(self, node, output, stack):
-        self.note("Light Path", BY_RAY)
-        return Value(0.0)

@@ -12,7 +12,8 @@ import numpy as np
 
 from . import library
 from .images import Images, Picture, image_of
-from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Mapping, Value, input_of
+from .mappings import Mapping, aligned
+from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Value, input_of
 
 HOLE = 1e-3  # an opacity that the library takes as "not there"; 0 means 1 to it
 LARGEST_FACTOR = 1e6  # of a texture, in the library
@@ -429,6 +430,7 @@ class Converted:
         return self.values.opacity < 2 * HOLE and "opacity" not in self.pictures and not any(self.values.emission)
 
 
+COARSE = "Textures that repeat much against others of their material, at a lower resolution"
 SLOTS = ("diffuse", "specular", "emission", "opacity")
 
 
@@ -494,11 +496,13 @@ class Materials:
             pictures["normal"], m.normal_strength = normals
         if heights is not None:
             pictures["height"], m.bump_distance, m.bump_strength = heights
-        mappings = {p.mapping for p in pictures.values()}
-        every = SLOTS + ("roughness", "metallic", "normal", "height")
-        mapping = next((pictures[slot].mapping for slot in every if slot in pictures), Mapping())
-        if len(mappings) > 1:
+        every = [slot for slot in (*SLOTS, "roughness", "metallic", "normal", "height") if slot in pictures]
+        together = aligned([pictures[slot] for slot in every], lambda p: self.report.note(f"{name} ({p})", COARSE))
+        if together is None:
             self.report.note(name, "Textures of one material on several coordinates, all laid on the first's")
+        else:
+            pictures = dict(zip(every, together))
+        mapping = pictures[every[0]].mapping if every else Mapping()
         for slot, picture in pictures.items():
             if slot == "opacity":
                 picture = self._mask(picture)

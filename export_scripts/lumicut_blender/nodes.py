@@ -9,25 +9,9 @@ import numpy as np
 
 from . import library
 from .images import Picture
+from .mappings import Mapping, aligned, sized
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
-
-
-class Mapping:
-    """Where an image lies on a mesh: coordinates (a UV map's name, "" the active one; or GENERATED), then an affine map."""
-
-    def __init__(self, source="UV", uv_map="", matrix=((1, 0, 0), (0, 1, 0))):
-        self.source, self.uv_map, self.matrix = source, uv_map, tuple(tuple(float(x) for x in row) for row in matrix)
-        self.key = (source, uv_map, self.matrix)
-
-    def __eq__(self, other):
-        return isinstance(other, Mapping) and self.key == other.key
-
-    def __hash__(self):
-        return hash(self.key)
-
-    def is_plain(self):
-        return self.key == ("UV", "", ((1, 0, 0), (0, 1, 0)))
 
 
 class Value:
@@ -217,10 +201,15 @@ class Evaluator:
 
     def apply(self, name, fn, *values):
         """fn over colours (..., 3), texel by texel where there are pictures."""
-        pictures = [v for v in values if v.picture is not None]
+        pictures = [v.picture for v in values if v.picture is not None]
         if not pictures:
             return Value(fn(*(v.factor for v in values)))
-        first = max(pictures, key=lambda v: v.picture.linear().size).picture
+        together = aligned(pictures)
+        if together is not None:
+            pictures = together
+            laid = iter(together)
+            values = [v if v.picture is None else Value(v.factor, next(laid)) for v in values]
+        first = max(pictures, key=lambda p: p.linear().size)
         height, width = first.linear().shape[:2]
         arrays = []
         for v in values:
@@ -230,10 +219,7 @@ class Evaluator:
                 self.note(v.picture.name, "Textures on other coordinates than their partner's, taken as their mean")
                 arrays.append(v.mean())
             else:
-                texels = v.texels()
-                rows = np.arange(height) * texels.shape[0] // height
-                columns = np.arange(width) * texels.shape[1] // width
-                arrays.append(texels if texels.shape[:2] == (height, width) else texels[rows][:, columns])
+                arrays.append(sized(v.texels(), width, height, v.picture.ends()))
         linear = np.maximum(np.broadcast_to(fn(*arrays), (height, width, 3)), 0).astype(np.float32)
         key = (name, self.owner, id(linear))
         return Value(1, Picture(f"{self.owner} {name}", key, first.mapping, first.flags, linear=linear))

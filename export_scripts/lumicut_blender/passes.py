@@ -105,11 +105,13 @@ def check_compositor(scene, layer):
 
 
 class Filler:
-    """Pixels of one rectangle of a render. `camera`: a library.Camera."""
+    """Pixels of one rectangle of a render. `camera`: a library.Camera. `backdrop(camera, tile)`: what it alone sees of the
+    world, which is in the light group of number `group`."""
 
-    def __init__(self, render, scene, camera, tile):
+    def __init__(self, render, scene, camera, tile, backdrop=None, group=0):
         self.render, self.scene, self.camera, self.tile = render, scene, camera, tile
-        self._read, self._exposure = {}, exposure(scene)
+        self._read, self._exposure, self._backdrop = {}, exposure(scene), backdrop
+        self._with_backdrop = {"radiance", f"radiance.{group}"} if backdrop is not None else set()
         self.hit = self.channel("alpha") > 0
 
     def channel(self, name):
@@ -124,6 +126,8 @@ class Filler:
 
     def lit(self, channel):
         pixels = self.channel(channel)
+        if channel in self._with_backdrop:
+            pixels = pixels + (1 - self.channel("alpha")) * self._backdrop(self.camera, self.tile).astype(np.float32)
         return pixels if self._exposure == 1 else pixels * np.float32(self._exposure)
 
     def combined(self):

@@ -94,7 +94,10 @@ class SceneData:
     images: list = dataclasses.field(default_factory=list)     # of materials' and environment's 1-based numbers
     profiles: list = dataclasses.field(default_factory=list)   # of lights' 1-based numbers
     lights: list = dataclasses.field(default_factory=list)     # (name, library.Light)
+    lamps: int = 0                                             # that these come from
     environment: library.Environment | None = None
+    backdrop: object = None  # worlds.Backdrop that the camera sees in place of the environment
+    transparent: bool = False  # whether the film is
     camera: library.Camera | None = None
     groups: list = dataclasses.field(default_factory=list)     # names of light groups, from number 1; 0: in none
 

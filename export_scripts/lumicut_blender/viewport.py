@@ -178,7 +178,7 @@ class Session:
                     scene, integrators, pending = fresh, {}, None
                 scene.set_camera(camera)
                 self._guarded(scene, scene.commit)
-                self._render_levels(device, scene, integrators, size, settings)
+                self._render_levels(device, scene, integrators, size, settings, camera)
                 self.message = "done"
             except library.Cancelled:
                 continue
@@ -192,7 +192,8 @@ class Session:
         if self._cancelled():
             raise library.Cancelled(library.CANCELLED, "a newer view waits")
 
-    def _render_levels(self, device, scene, integrators, size, settings):
+    def _render_levels(self, device, scene, integrators, size, settings, camera):
+        data = self.data
         for number, (divisor, name, values) in enumerate(settings["levels"]):
             key = (name, tuple(sorted(values.items())))
             if key not in integrators:
@@ -206,17 +207,15 @@ class Session:
                 self._guarded(render, lambda: render.wait(library.FOREVER))
                 radiance, alpha = render.read("radiance"), render.read("alpha")
             picture = np.ones((height, width, 4), np.float32)
+            if data.backdrop is not None:
+                radiance = radiance + (1 - alpha) * data.backdrop.seen(camera, width, height, (0, 0, width, height))
             picture[..., :3] = radiance[::-1] * settings["exposure"]
-            if scene_is_transparent(self.data):
+            if data.transparent:
                 picture[..., 3] = alpha[::-1, :, 0]
             with self.condition:
                 self.picture = np.ascontiguousarray(np.minimum(picture, 60000.0))  # of half floats
                 self.picture_number += 1
                 self.levels_done = number + 1
-
-
-def scene_is_transparent(data):
-    return data is not None and data.environment is not None and bool(data.environment.flags & library.HIDDEN)
 
 
 def _tick():

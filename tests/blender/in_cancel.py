@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 import helpers as h
-from lumicut_blender import engine, nodes, properties
+from lumicut_blender import engine, images, properties
 
 # The goal is half a second. All threads may be at work in it, on a processor half as fast.
 MOST_CPU = 0.5 * 2 * len(os.sched_getaffinity(0))
@@ -137,5 +137,5 @@ class Cancel(unittest.TestCase):
         with h.quiet():
             watch.run()
         self.assertIsNone(watch.stopped)
-        self.assertGreater(watch.polls["collecting the scene"], side * side * 4 // nodes.SLAB)
+        self.assertGreater(watch.polls["collecting the scene"], side * side * 4 // images.SLAB)
         self.assertLess(watch.longest["collecting the scene"], MOST_CPU)

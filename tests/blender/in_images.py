@@ -9,6 +9,8 @@ import numpy as np
 
 import helpers as h
 
+LINEAR = "Linear" if h.VERSION < (4, 0, 0) else "Linear Rec.709"
+
 
 def image_of(name, texels, space="sRGB", as_float=False):
     """(h, w, 3 or 4) texels, top row first, as they are stored; packed."""
@@ -76,7 +78,7 @@ class Images(unittest.TestCase):
         for as_float in (False, True):
             with self.subTest(as_float=as_float):
                 self.setUp()
-                image = image_of("a", halves((.8, .6, .4, .25), (.8, .6, .4, 1)), "Linear" if as_float else "sRGB", as_float)
+                image = image_of("a", halves((.8, .6, .4, .25), (.8, .6, .4, 1)), LINEAR if as_float else "sRGB", as_float)
                 m, texture, _ = self.textured(image)
                 output = next(n for n in m.node_tree.nodes if n.type == "OUTPUT_MATERIAL")
                 mix, dark = (m.node_tree.nodes.new("ShaderNode" + kind) for kind in ("MixShader", "Emission"))
@@ -195,3 +197,69 @@ class Images(unittest.TestCase):
                 # The picture's texels are bent here, its filtered colours there; ramps differ little.
                 self.compare(0.02)
                 self.assertEqual(h.last_notes(), [])
+
+
+class Mappings(unittest.TestCase):
+    """Two images of one material on different coordinates."""
+
+    def setUp(self):
+        self.scene = h.new_scene(40, 40)
+        self.scene.camera.data.type, self.scene.camera.data.ortho_scale = "ORTHO", 2
+        h.set_world((0.2, 0.4, 0.8))
+        self.m = h.material("Two")
+        x, y = np.meshgrid(np.arange(8) / 7, np.arange(8) / 7)
+        self.ramp = image_of("ramp", np.stack([x, y, 0.2 + 0 * x], -1), "Non-Color")
+        self.disk = image_of("disk", ((np.hypot(x - 0.4, y - 0.5) < 0.4) * 1.0)[..., None].repeat(3, 2), "Non-Color")
+        h.add_plane(2, material=self.m).data.uv_layers.new(name="Map").data.foreach_set("uv", [0, 0, 1, 0, 1, 1, 0, 1])
+
+    def node(self, kind, **links):
+        node = self.m.node_tree.nodes.new("ShaderNode" + kind)
+        for name, socket in links.items():
+            self.m.node_tree.links.new(socket, node.inputs[name.replace("_", " ")])
+        return node
+
+    def texture(self, image, scale=(1, 1), turn=0.0, place=(0, 0)):
+        mapping = self.node("Mapping", Vector=self.node("TexCoord").outputs["UV"])
+        mapping.inputs["Scale"].default_value, mapping.inputs["Location"].default_value = (*scale, 1), (*place, 0)
+        mapping.inputs["Rotation"].default_value = (0, 0, turn)
+        texture = self.node("TexImage", Vector=mapping.outputs[0])
+        texture.image = image
+        return texture.outputs["Color"]
+
+    def shown(self, *links):
+        output = next(n for n in self.m.node_tree.nodes if n.type == "OUTPUT_MATERIAL")
+        self.m.node_tree.links.new(links[0], output.inputs["Surface"])
+        ours, theirs = h.both(64, 64)
+        a, b = (h.blocks(h.radiance(image), 4) for image in (ours, theirs))
+        # Texels are filtered before they meet here, and after that there.
+        self.assertLess(np.abs(a - b).mean(), 0.02)
+        self.assertGreater(np.corrcoef(a.ravel(), b.ravel())[0, 1], 0.98)
+        return h.last_notes()
+
+    def test_products_of_images_that_repeat_together_are_cycles(self):
+        for scale, turn, place in (((3, 3), 0, (0, 0)), ((2.5, 1.5), 0, (0.3, 0.1)), ((2, 2), np.pi / 2, (0, 0.25)),
+                                   ((0.5, 1), 0, (0, 0)), ((-2, 1), 0, (0, 0))):
+            with self.subTest(scale=scale, turn=turn, place=place):
+                self.setUp()
+                product = self.node("MixRGB", Color1=self.texture(self.ramp), Color2=self.texture(self.disk, scale, turn, place))
+                product.blend_type = "MULTIPLY"
+                product.inputs[0].default_value = 1
+                self.assertEqual(self.shown(self.node("Emission", Color=product.outputs[0]).outputs[0]), [])
+
+    def test_slots_of_a_material_keep_their_own_tiling(self):
+        colour = self.node("Emission", Color=self.texture(self.ramp, (1, 1)))
+        mask = self.node("MixShader", Fac=self.texture(self.disk, (4, 2)))
+        self.m.node_tree.links.new(self.node("BsdfTransparent").outputs[0], mask.inputs[1])
+        self.m.node_tree.links.new(colour.outputs[0], mask.inputs[2])
+        self.assertEqual(self.shown(mask.outputs[0]), [])
+
+    def test_what_does_not_repeat_together_is_named(self):
+        colour = self.node("Emission", Color=self.texture(self.ramp))
+        mask = self.node("MixShader", Fac=self.texture(self.disk, (1.37, 2), 0.4))
+        self.m.node_tree.links.new(self.node("BsdfTransparent").outputs[0], mask.inputs[1])
+        self.m.node_tree.links.new(colour.outputs[0], mask.inputs[2])
+        self.m.node_tree.links.new(mask.outputs[0], next(n for n in self.m.node_tree.nodes if n.type == "OUTPUT_MATERIAL").inputs[0])
+        with h.quiet():
+            h.set_lumicut("exhaustive", vpls=50)
+            h.render()
+        self.assertEqual(h.last_notes(), ["Textures of one material on several coordinates, all laid on the first's: Two"])

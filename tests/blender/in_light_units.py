@@ -70,6 +70,18 @@ class LightUnits(unittest.TestCase):
                     shadow_soft_size=0)
         self.agree()
 
+    def test_spots_of_a_radius_have_soft_edges_and_soft_shadows(self):
+        h.add_mesh("Card", [(0, -1, 0.6), (0.6, -1, 0.6), (0.6, 1, 0.6), (0, 1, 0.6)], [(0, 1, 2, 3)], h.diffuse())
+        # Cycles turns its disk towards each point: that takes some per cent where the radius is a tenth of the distance.
+        for radius, mean, most in ((0.05, 0.01, 0.02), (0.25, 0.02, 0.03), (0.5, 0.06, 0.06)):
+            with self.subTest(radius=radius):
+                for ob in [ob for ob in bpy.data.objects if ob.type == "LIGHT"]:
+                    bpy.data.objects.remove(ob)
+                h.add_light("SPOT", (0, 0, 2.5), 200, spot_size=math.radians(70), spot_blend=0.1, shadow_soft_size=radius)
+                a, b = (h.blocks(h.radiance(image)) for image in self._both(256, 100))
+                np.testing.assert_allclose(a.mean((0, 1)) / b.mean((0, 1)), 1, atol=mean)
+                self.assertLess(np.abs(a - b).max() / b.max(), most)
+
     def test_sun(self):
         for angle in (0.0, 10.0):
             with self.subTest(angle=angle):

@@ -153,6 +153,26 @@ class Layers(BesideCycles):
         self.assertLess(other["Combined"][..., 0].max(), 1)
         self.assertNotIn("Depth", other)
 
+    def test_what_collections_hide_is_listed_by_object(self):
+        group = bpy.data.collections.new("Group")
+        self.scene.collection.children.link(group)
+        group.objects.link(self.ball)
+        self.scene.collection.objects.unlink(self.ball)
+        twin = h.link(bpy.data.objects.new("Twin", self.ball.data))
+        twin.visible_shadow, twin.is_shadow_catcher = False, True
+        of_layer = self.layer.layer_collection.children["Group"]
+        for flag, text in (("holdout", "Holdouts taken as ordinary objects: Sphere"),
+                           ("indirect_only", "Objects of Indirect Only collections, which the camera sees here: Sphere")):
+            with self.subTest(flag=flag), h.quiet():
+                of_layer.holdout = of_layer.indirect_only = False
+                setattr(of_layer, flag, True)
+                h.set_lumicut("exhaustive", vpls=50)
+                h.render()
+                self.assertIn(text, h.last_notes())
+                # Flags of an object whose mesh another has, too.
+                self.assertIn("Objects hidden from some rays, which all see here: Twin", h.last_notes())
+                self.assertIn("Shadow catchers taken as ordinary objects: Twin", h.last_notes())
+
     def test_notes_of_all_layers_are_shown(self):
         m = h.material("Toon")
         h.shader(m, "ShaderNodeBsdfToon")
