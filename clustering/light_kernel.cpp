@@ -89,8 +89,8 @@ size_t LightPoints(const Vpl& light, const Rgb& intensity, Falloff falloff, cons
                    size_t count, LitPoints& lit, const uint16_t* wanted, const DirectionScatter* scatter) {
   const Lobes lobes = points.lobes();
   if (scatter == nullptr)
-    return RunKernel<LightKernel<false>>(light.kind, lobes, light, intensity, falloff, points, first, count, lit, wanted,
-                                         scatter);
+    return RunKernel<LightKernel<false>>(light.kind, lobes, light, intensity, falloff, points, first, count, lit,
+                                         wanted, scatter);
   if (light.kind == VplKind::sphere)
     return RunForLobes<LightKernel<true>, VplKind::sphere>(lobes, light, intensity, falloff, points, first, count, lit,
                                                            wanted, scatter);

@@ -196,7 +196,8 @@ Vpl LightSampler::sample_lamp(uint32_t lamp, Rng& rng) const {
   const Light& l = scene_.lights()[lamp];
   if (l.type == LightType::spot) return spot_of(l);
   if (l.type == LightType::point) {
-    if (const LightProfile* profile = l.profile != 0 ? scene_.profiles().find(l.profile) : nullptr) return profiled(l, *profile);
+    if (const LightProfile* profile = l.profile != 0 ? scene_.profiles().find(l.profile) : nullptr)
+      return profiled(l, *profile);
     if (!(l.radius > 0.0f)) {
       Vpl v;
       v.position = l.position, v.intensity = l.value, v.group = l.group;
