@@ -278,7 +278,7 @@ TEST_P(Work, IsAtMostTwiceThatOfSummingAllLights) {
                               std::string(GetParam()) == "row_column_sampling";
         if (heavy && sampling) continue;
         const test::Settings settings = heavy ? heavy_settings(GetParam()) : test::Settings{};
-        const Counters c = test::render(*scene, GetParam(), vpls, settings, 40, 30).counters;
+        const Counters c = test::render(*scene, GetParam(), vpls, settings, {.width = 40, .height = 30}).counters;
         const double pairs = static_cast<double>(c.points) * static_cast<double>(vpls.lights.size());
         const double work = static_cast<double>(c.rays + c.bounds + c.clusters) / (2.0 * pairs);
         std::printf("%s, %s lamps, %s: %.4f of exhaustive's\n", accel, more_lamps ? "three" : "one",
