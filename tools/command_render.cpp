@@ -1,6 +1,5 @@
 // lumicut render: a scene file to an image, through the C ABI alone.
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
 #include <chrono>
@@ -74,12 +73,6 @@ void log_message(void* user, int32_t level, const char* text) {
   print_error("lumicut: {}: {}\n", kNames[std::clamp(level, 0, 3)], text);
 }
 
-uint64_t peak_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
-}
-
 // What the renders says of itself, with the command's own phases and figures a pixel.
 ordered_json statistics(const ordered_json& own, double pixels, double read_seconds, double commit_seconds) {
   const auto counter = [&](const char* name) {
@@ -93,7 +86,7 @@ ordered_json statistics(const ordered_json& own, double pixels, double read_seco
   stats["rays_per_pixel"] = counter("rays") / pixels;
   stats["bounds_per_pixel"] = counter("bounds") / pixels;
   stats["clusters_per_pixel"] = counter("clusters") / pixels;
-  stats["peak_bytes"] = std::max(own.value("peak_bytes", uint64_t{0}), peak_bytes());
+  stats["peak_bytes"] = std::max(own.value("peak_bytes", uint64_t{0}), io::peak_memory());
   stats["counters"] = own.value("counters", ordered_json::object());
   stats["values"] = own.value("values", ordered_json::object());
   return stats;

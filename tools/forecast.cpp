@@ -8,6 +8,7 @@
 #include <limits>
 #include <thread>
 
+#include "io/physical_memory.h"
 #include "tools/commands.h"
 
 namespace lumicut::tools {
@@ -26,12 +27,6 @@ double cpu_now() {
     return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
   };
   return seconds(u.ru_utime) + seconds(u.ru_stime);
-}
-
-double peak_now() {
-  rusage u{};
-  getrusage(RUSAGE_SELF, &u);
-  return static_cast<double>(u.ru_maxrss) * 1024;
 }
 
 // Of a render, from one of one pixel that is cancelled at once: it is known when it starts.
@@ -139,7 +134,7 @@ Forecast forecast(const io::Api& api, const RenderSetup& setup, lumicut_scene sc
   f.checkpoint_bytes = f.pixels * kept;
   // While it renders, what the library says of its films, means and checkpoints; then the film, the last checkpoint, the
   // copies of the film that are written, and those that the file formats make.
-  f.peak_bytes = std::max(0.0, peak_now() - held_bytes) +
+  f.peak_bytes = std::max(0.0, static_cast<double>(io::peak_memory()) - held_bytes) +
                  std::max(bytes_of_library(api, scene, integrator, desc), f.pixels * (kept + 3 * film));
   return f;
 }

@@ -78,7 +78,7 @@ class LightUnits(unittest.TestCase):
                 for ob in [ob for ob in bpy.data.objects if ob.type == "LIGHT"]:
                     bpy.data.objects.remove(ob)
                 h.add_light("SPOT", (0, 0, 2.5), 200, spot_size=math.radians(70), spot_blend=0.1, shadow_soft_size=radius)
-                a, b = (h.blocks(h.radiance(image)) for image in self._both(256, 100))
+                a, b = (h.blocks(h.radiance(image)) for image in self._both(256, 100, 4))
                 np.testing.assert_allclose(a.mean((0, 1)) / b.mean((0, 1)), 1, atol=mean)
                 self.assertLess(np.abs(a - b).max() / b.max(), most)
 

@@ -131,6 +131,13 @@ class Render(Cli):
         self.assertEqual(stats["parameters"]["error"], "0.05")
         self.assertEqual((self.folder / "a.vpl").stat().st_size, 32 + 64 * stats["vpls"])
 
+    def test_peak_memory_is_the_commands_own(self):
+        ballast = bytearray(os.urandom(1)) * (400 << 20)  # getrusage gives it to whom this process starts
+        self.assert_ends(self.render("--stats", self.folder / "a.json"), OK)
+        self.assertLess(json.loads((self.folder / "a.json").read_text())["peak_bytes"], len(ballast) / 2)
+        forecast = json.loads(lumicut("check", SCENE, "--size", "24x24", "--vpls", "200", "--json").stdout)["forecast"]
+        self.assertLess(forecast["peak_bytes"], len(ballast) / 2)
+
     def test_the_same_lights_give_the_same_image(self):
         first, second, lights = (self.folder / n for n in ("a.exr", "b.exr", "a.vpl"))
         self.assert_ends(self.render("-i", "exhaustive", "-o", first, "--vpl-out", lights), OK)
