@@ -107,7 +107,7 @@ HWY_INLINE V3 GrownBySpheres(D d, const V3& half, const LightNode& node) {
 }
 
 // light_node_bounds of one kind of light. Departs from Walter et al.: luminance is bounded through each colour channel
-// on its own, so a blue lamp over a red wall costs nothing; and the cosine to the light's cone and to the surface are
+// on its own, so a blue light over a red wall costs nothing; and the cosine to the light's cone and to the surface are
 // bounded in their own frames each.
 struct BoundsKernel {
   template <VplKind kKind, Lobes kLobes>

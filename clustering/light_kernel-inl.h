@@ -17,7 +17,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 // Falloff of a spot towards `to_light`, from each point. SIMD counterpart of Falloff::of_spot.
 HWY_INLINE V SpotFalloff(D d, const Vpl& light, Falloff falloff, const V3& light_normal, const V3& to_light) {
   const V zero = hn::Zero(d);
-  if (light.profile != 0) {  // lamps alone have one: lane by lane
+  if (light.profile != 0) {  // of the scene's lights alone: lane by lane
     const LightProfile* profile = falloff.profile(light);
     HWY_ALIGN float x[kLanes], y[kLanes], z[kLanes];
     hn::Store(to_light.x, d, x), hn::Store(to_light.y, d, y), hn::Store(to_light.z, d, z);

@@ -157,7 +157,7 @@ void LightTree::add_kind(const std::vector<Vpl>& lights, const std::vector<uint3
     c.directions.extend(v.normal);
     c.intensity = v.intensity;
     if (v.kind == VplKind::sphere) c.least_radius = c.largest_radius = v.radius();
-    // The profile of a narrowed area lamp ends where its cosine does.
+    // The profile of a narrowed area light ends where its cosine does.
     if (v.kind == VplKind::spot)
       c.widest_spot = v.profile == 0 && v.spot_cosine > 0.0f ? std::max(0.0f, v.cos_outer()) : v.cos_outer();
   }

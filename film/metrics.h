@@ -26,7 +26,7 @@ struct RgbImage {
 };
 
 struct MetricOptions {
-  // Pixels whose reference luminance is at least this are ignored (directly visible lamps).
+  // Pixels whose reference luminance is at least this are ignored (directly visible lights).
   float ignore_above = std::numeric_limits<float>::infinity();
   // Factor from radiance to [0,1] for rmse_display, FLIP and error images; 0: auto_exposure of the reference.
   float exposure = 0.0f;

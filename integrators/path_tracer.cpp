@@ -124,7 +124,7 @@ class PathTracer final : public Integrator {
     }
   }
 
-  // One lamp without extent and one sample of what has some, each by power.
+  // One light without extent and one sample of what has some, each by power.
   void sample_lights(Path& path, std::vector<Ray>& rays, std::vector<Shadow>& shadows) const {
     if (!delta_.empty()) {
       const size_t i = delta_.sample(path.rng.next_float());

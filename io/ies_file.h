@@ -1,4 +1,4 @@
-// Photometric files of IESNA LM-63 (1986, 1991, 1995, 2002): intensity of a lamp by direction.
+// Photometric files of IESNA LM-63 (1986, 1991, 1995, 2002): intensity of a light by direction.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 namespace lumicut::io {
 
 struct IesProfile {
-  std::vector<double> vertical;    // degrees from the lamp's axis (down, as mounted), rising
+  std::vector<double> vertical;    // degrees from the light's axis (down, as mounted), rising
   std::vector<double> horizontal;  // degrees about it, from 0 to 360; one alone: the same all around
   std::vector<double> candela;     // vertical.size() for each horizontal angle; multiplier and ballast factors are in
   double watts = 0;                // as the file says

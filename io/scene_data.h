@@ -37,7 +37,7 @@ struct Mesh {
   uint32_t group = 0;
 };
 
-// Intensity of a lamp by direction, as lumicut_profile has it.
+// Intensity of a light by direction, as lumicut_profile has it.
 struct Profile {
   std::string file;
   std::vector<float> vertical, horizontal, values;  // radians; W/sr

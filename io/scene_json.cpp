@@ -564,7 +564,7 @@ class SceneReader {
     add_light(value, light);
   }
 
-  // A point lamp with the file's intensities; a spot cuts its cone out of them.
+  // A point light with the file's intensities; a spot cuts its cone out of them.
   void read_profile(JsonObject& object, const JsonValue& file, lumicut_light& light) {
     if (light.radius > 0) object.need("radius").fail("a lamp with \"ies\" is a point: leave \"radius\" out");
     const Vec axis = direction(object.need("direction"));
@@ -724,7 +724,7 @@ class SceneReader {
     scene_.environment = environment;
   }
 
-  // A map of the sky and a lamp for the sun.
+  // A map of the sky and a light for the sun.
   void read_sky(const JsonValue& value, const JsonValue& owner, lumicut_environment& environment, double strength) {
     for (const char* key : {"rotation", "world_to_map"})
       if (owner.raw().contains(key)) value.fail(fmt::format("a sky turns by \"sun_rotation\": leave \"{}\" out", key));

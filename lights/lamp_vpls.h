@@ -1,4 +1,4 @@
-// Lamps as virtual lights: how each kind emits. Shared by the files of LightSampler.
+// Lights as virtual lights: how each kind emits. Shared by the files of LightSampler.
 #pragma once
 
 #include <cmath>
@@ -10,7 +10,7 @@
 
 namespace lumicut {
 
-// Area lamps of spread s emit Lambert times N·max(0, 1 − tanθ·tan a), a = (π−s)/2, whose flux stays that of Lambert.
+// Area lights of spread s emit Lambert times N·max(0, 1 − tanθ·tan a), a = (π−s)/2, whose flux stays that of Lambert.
 // [Cycles; docs/units.md]
 inline Vpl spread_profile(const Light& light) {
   Vpl v;
@@ -32,7 +32,7 @@ inline Vpl spot_of(const Light& l) {
   return v;
 }
 
-// A point lamp with a measured profile.
+// A point light with a measured profile.
 inline Vpl profiled(const Light& l, const LightProfile& profile) {
   Vpl v;
   v.kind = VplKind::spot, v.position = l.position, v.normal = l.direction, v.intensity = l.value, v.group = l.group;

@@ -35,7 +35,7 @@ class LightSampler {
   explicit LightSampler(const Scene& scene, const Progress* progress = nullptr);
   bool empty() const { return power_.empty(); }
 
-  // Lamps without extent: one VPL each, exactly.
+  // Lights without extent: one VPL each, exactly.
   const std::vector<Vpl>& delta_lights() const { return delta_; }
   // True where some emitter beside the environment has extent, and so needs many VPLs for its direct light.
   bool has_extended() const { return extended_ < sampler_.size(); }
@@ -52,7 +52,7 @@ class LightSampler {
   EmittedRay sample_ray(Rng& rng) const;
   // One VPL that stands for the direct light of environment and extended emitters, where there are any.
   DirectSample sample_light(Rng& rng) const;
-  // A lamp of the scene (no sun) as one virtual light: a sample of where it emits, exact where it has no extent.
+  // A light of the scene (no sun) as one virtual light: a sample of where it emits, exact where it has no extent.
   Vpl sample_lamp(uint32_t lamp, Rng& rng) const;
   // Density with which sample_light draws a place on an emissive mesh, on a rectangle or disk, for each unit of area, and
   // a direction towards the environment, for each steradian.
@@ -67,7 +67,7 @@ class LightSampler {
   enum class Kind : uint8_t { point, spot, profile, sphere, rectangle, disk, sun, environment, triangle };
   struct Emitter {
     Kind kind;
-    uint32_t index;     // lamp, or mesh
+    uint32_t index;     // light, or mesh
     uint32_t instance;  // triangle
     uint32_t triangle;
   };

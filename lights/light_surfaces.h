@@ -1,5 +1,5 @@
-// Rectangles and disks that emit, as rays meet them. The camera does not see lamps, but paths that leave surfaces do
-// well to: close to a lamp, samples of its area alone are all noise. [Veach, Guibas 1995]
+// Rectangles and disks that emit, as rays meet them. The camera does not see lights, but paths that leave surfaces do
+// well to: close to a light, samples of its area alone are all noise. [Veach, Guibas 1995]
 #pragma once
 
 #include <memory>
@@ -18,7 +18,7 @@ class LightSurfaces final : private HitFilter {
     float t, cosine, area;
     Rgb radiance;
   };
-  // Lamps that shine against a ray of unit direction, between its origin and `far`; nearest first.
+  // Lights that shine against a ray of unit direction, between its origin and `far`; nearest first.
   template <typename Fn>
   void for_each_hit(const Vec3f& origin, const Vec3f& direction, float far, Fn&& fn) const {
     float near = 0.0f;

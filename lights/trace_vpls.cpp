@@ -1,4 +1,4 @@
-// Light tracing: lamps, emissive meshes and environment → VPLs. [Keller 1997; Walter et al. 2005 sec. 5; thesis ch. 1]
+// Light tracing: lights, emissive meshes and environment → VPLs. [Keller 1997; Walter et al. 2005 sec. 5; thesis ch. 1]
 // Departs: emitters are chosen by power, and flux is divided by the number of light paths that were started (dividing
 // by the number of VPLs, as some codes do, halves the indirect light of a closed room of albedo ½).
 #include "lights/trace_vpls.h"

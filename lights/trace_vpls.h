@@ -1,4 +1,4 @@
-// Light tracing: lamps, emissive meshes and environment → VPLs. [Keller 1997; Walter et al. 2005 sec. 5]
+// Light tracing: lights, emissive meshes and environment → VPLs. [Keller 1997; Walter et al. 2005 sec. 5]
 #pragma once
 
 #include "core/fields.h"
@@ -12,7 +12,7 @@ namespace lumicut {
 struct VplOptions {
   // Wanted lights in all; what comes is within a few percent.
   uint32_t count = 60000;
-  // Of them on extended emitters, for their direct light (point, spot and sun lamps take one each).
+  // Of them on extended emitters, for their direct light (point, spot and sun lights take one each).
   float direct_share = 0.25f;
   // Of them for the environment, not above `count`; 0: a part of the direct ones by power.
   uint32_t environment_count = 0;

@@ -23,7 +23,7 @@ struct Vpl {
   Rgb intensity{};                                // W/sr along the normal; directional: irradiance W/m²
   float edge_or_radius = 0.0f;                    // spot: cos_outer(); sphere: radius()
   float blend_cosine = 0.0f, spot_cosine = 0.0f;  // spot
-  float spread_tan = 0.0f;  // spot: narrowed area lamps fall off with max(0, 1 − spread_tan·tanθ)
+  float spread_tan = 0.0f;  // spot: narrowed area lights fall off with max(0, 1 − spread_tan·tanθ)
   // Spot: id of a LightProfile [scene/light_profile.h] in place of the falloff above; then blend_cosine, spot_cosine and
   // spread_tan are the unit vector where its horizontal angle 0 lies, and intensity is that of its largest value.
   uint32_t profile = 0;

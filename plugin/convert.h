@@ -1,4 +1,4 @@
-// What hosts describe → what the library computes with: every field is checked, and lamps in watt become radiometric.
+// What hosts describe → what the library computes with: every field is checked, and lights in watt become radiometric.
 // [docs/units.md] All throw Error naming field and value.
 #pragma once
 

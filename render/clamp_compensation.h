@@ -19,7 +19,7 @@ class ClampCompensation {
   // outlives this. Throws Error(cancelled).
   ClampCompensation(const Scene& scene, float distance, bool spheres, uint64_t seed, const Progress& progress);
 
-  // One ray from each point (unless it is cut short by chance, or the point is black), one sample of each near lamp,
+  // One ray from each point (unless it is cut short by chance, or the point is black), one sample of each near light,
   // and one of all emissive meshes. `level` counts the surfaces since the camera. Deterministic: numbers belong to the places of points.
   TracedPoints trace(const ShadePoints& points, uint32_t level, const Progress& progress, Counters& counters) const;
 

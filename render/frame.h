@@ -14,7 +14,7 @@ struct FrameOptions {
   Rect crop;  // inside width × height
   uint64_t seed = 1;
   float compensate = 0.0f;  // distance of the clamp whose loss rays bring back; 0: none [render/clamp_compensation.h]
-  bool spheres = false;     // virtual lights are: the clamp takes light of lamps alone
+  bool spheres = false;     // virtual lights are: the clamp takes direct light alone
   // Of a render in passes: samples go on from here in the pixel's sequence, and a single one lies at random too.
   struct CameraSamples {
     uint64_t seed;  // the same in all passes

@@ -10,7 +10,7 @@ namespace lumicut {
 
 namespace {
 
-constexpr int64_t kMaxCells = 4096;  // of one lamp: larger ones are tried at every point
+constexpr int64_t kMaxCells = 4096;  // of one light: larger ones are tried at every point
 
 // Box of what emits.
 Aabb bounds_of(const Light& l) {
@@ -56,7 +56,7 @@ NearbyLights::Cell NearbyLights::cell(const Vec3f& p) const {
   return {floor(at.x), floor(at.y), floor(at.z)};
 }
 
-// Cells that share a key only cost time: every lamp is measured again at the point.
+// Cells that share a key only cost time: every light is measured again at the point.
 uint64_t NearbyLights::key(const Cell& c) {
   return hash64(hash64(static_cast<uint64_t>(c.x), static_cast<uint64_t>(c.y)), static_cast<uint64_t>(c.z));
 }

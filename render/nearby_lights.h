@@ -1,4 +1,4 @@
-// Lamps that are near a point: what the clamp takes from them is given back by sampling them. They are invisible, so no
+// Lights that are near a point: what the clamp takes from them is given back by sampling them. They are invisible, so no
 // ray finds them.
 #pragma once
 
@@ -17,8 +17,8 @@ class NearbyLights {
   NearbyLights(const Scene& scene, const LightSampler& emitters, float distance, const Progress& progress);
   bool empty() const { return lamps_.empty(); }
 
-  // What one sample of each near lamp gives the point beyond its clamped light, before visibility: fn(vpl, radiance).
-  // Weighted for rays of the point's reflectance that find the same lamps [lights/light_surfaces.h].
+  // What one sample of each near light gives the point beyond its clamped light, before visibility: fn(vpl, radiance).
+  // Weighted for rays of the point's reflectance that find the same lights [lights/light_surfaces.h].
   template <typename Fn>
   void for_each_share(const SurfacePoint& point, Rng& rng, Fn&& fn) const {
     for (uint32_t i : large_) share(i, point, rng, fn);

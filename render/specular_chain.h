@@ -18,7 +18,7 @@ struct ChainRay {
 // The ray that goes on from a surface with a specular lobe, if chance keeps it; `throughput`: of what the surface shows.
 std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uint32_t pixel, Rng rng);
 
-// Follows the rays to their ends. Lamps with an area are seen in mirrors, though not by the camera itself.
+// Follows the rays to their ends. Lights with an area are seen in mirrors, though not by the camera itself.
 void follow_chains(const Scene& scene, const LightSurfaces& lamps, std::vector<ChainRay> rays, const Progress& progress,
                    TracedPoints& hits, Counters& counters);
 

@@ -1,4 +1,4 @@
-// Lamps. They are not seen by the camera and block nothing; an emissive mesh is and does.
+// Lights. They are not seen by the camera and block nothing; an emissive mesh is and does.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// What is rendered: meshes, materials, textures, lamps, environment, camera, and the accel that traces rays in it.
+// What is rendered: meshes, materials, textures, lights, environment, camera, and the accel that traces rays in it.
 // Setters keep the host's data; `commit` checks it as a whole and builds. After commit all queries are [shared].
 #pragma once
 

@@ -125,7 +125,7 @@ std::unique_ptr<Scene> make_scene(const BenchMesh& mesh) {
   scene->add_mesh(std::move(m));
   Progress progress;
   scene->commit(progress);
-  // A lamp in the middle of the upper half.
+  // A light in the middle of the upper half.
   const Aabb b = scene->bounds();
   Light lamp;
   lamp.position = b.center() + Vec3f{0, 0.2f * b.extent().y, 0};

@@ -188,7 +188,7 @@ TEST_P(Backends, RaysOutOfRangeHitNothing) {
         EXPECT_EQ(blocked(*accel, r), hit) << field << " " << huge;
         EXPECT_FALSE(field < 6 && hit) << field << " " << huge;
         if (field >= 3) continue;
-        // The same place as a lamp, as a point, and as a sun's direction.
+        // The same place as a light, as a point, and as a sun's direction.
         const float x[2] = {r.ray.org.x, 0.5f}, y[2] = {r.ray.org.y, 0.5f}, z[2] = {r.ray.org.z, 0.5f};
         uint8_t out[2] = {7, 7};
         accel->occluded_from_point(r.ray.org, false, x + 1, y + 1, z + 1, 1, out);
@@ -333,7 +333,7 @@ __attribute__((noinline)) void fill_stack(uint8_t value) {
   for (volatile uint8_t& byte : memory) byte = value;
 }
 
-// Bundles of 1 to 333 points around each other, to a lamp or a sun, against single rays.
+// Bundles of 1 to 333 points around each other, to a light or a sun, against single rays.
 void expect_bundles_agree_with_single_rays(const Accel& accel, uint64_t seed) {
   Rng rng(seed, Stage::test);
   for (const size_t n : {size_t{1}, size_t{7}, size_t{16}, size_t{17}, size_t{64}, size_t{100}, size_t{333}}) {

@@ -1,4 +1,4 @@
-// Photometric files: read, and made into the profile that a lamp has.
+// Photometric files: read, and made into the profile that a light has.
 #include "io/ies_file.h"
 
 #include "io/file_error.h"

@@ -152,7 +152,7 @@ TEST_P(Cancelling, EndsPreparingSoon) {
   }
 }
 
-// Meshes that are turned, stretched, mirrored and moved; a lamp and a sun.
+// Meshes that are turned, stretched, mirrored and moved; a light and a sun.
 std::unique_ptr<Scene> instanced_scene(uint64_t seed, const char* accel) {
   auto scene = std::make_unique<Scene>(Scene::Config{accel, true, ""});
   scene->set_materials({test::diffuse(0.5f, 0.5f, 0.5f)});
@@ -210,8 +210,8 @@ TEST_P(InstancedScenes, EndOnEmbreeToo) {
   }
 }
 
-// A room of metals from smooth to rough, some of them instances, under a lamp of 50 kW: one that is alone, or beside a
-// lamp of 1 W and a strong sun through the open side. What is bright there is 10^4 times what is dim, and lobes are narrow.
+// A room of metals from smooth to rough, some of them instances, under a light of 50 kW: one that is alone, or beside a
+// light of 1 W and a strong sun through the open side. What is bright there is 10^4 times what is dim, and lobes are narrow.
 std::unique_ptr<Scene> metal_room(const char* accel, bool more_lamps) {
   auto scene = std::make_unique<Scene>(Scene::Config{accel, true, ""});
   std::vector<Material> materials = {test::diffuse(0.7f, 0.7f, 0.7f)};

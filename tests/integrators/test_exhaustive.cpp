@@ -82,7 +82,7 @@ TEST(Exhaustive, WhiteFurnaceUnderAConstantSky) {
 }
 
 TEST(Exhaustive, ClosedWhiteBoxHasTheRadianceOfItsGeometricSeries) {
-  // All walls alike, one lamp: mean irradiance Φ/(A(1−ρ)), mean radiance ρ/π of it. The camera sees the whole sphere of
+  // All walls alike, one light: mean irradiance Φ/(A(1−ρ)), mean radiance ρ/π of it. The camera sees the whole sphere of
   // walls only roughly, so the mean over the walls is taken at points on them.
   constexpr float kAlbedo = 0.5f;
   auto scene = std::make_unique<Scene>(Scene::Config{});

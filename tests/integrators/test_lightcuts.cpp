@@ -62,7 +62,7 @@ TEST(Lightcuts, SameImageOnOneAndFourThreads) {
 }
 
 TEST(Lightcuts, ImageDoesNotDependOnTheScaleOfTheScene) {
-  // Scales that are powers of two round alike; the lamps' radiance stays, so the image does.
+  // Scales that are powers of two round alike; the lights' radiance stays, so the image does.
   const auto image = [](float scale) {
     const auto scene = test::make_room(scale);
     return test::render(*scene, "lightcuts", test::lights_of(*scene, 3000), {}).radiance;

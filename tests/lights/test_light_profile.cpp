@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// A lopsided lamp: four quarters, downwards and a little up.
+// A lopsided light: four quarters, downwards and a little up.
 LightProfile lopsided() {
   std::vector<float> vertical, horizontal, values;
   for (int i = 0; i <= 12; ++i) vertical.push_back(static_cast<float>(i * kPi / 18));  // to 120 degrees

@@ -1,4 +1,4 @@
-// LightSampler: what light paths and direct VPLs carry must be the lamps' own power, measured at a distance.
+// LightSampler: what light paths and direct VPLs carry must be the lights' own power, measured at a distance.
 #include <gtest/gtest.h>
 
 #include <numbers>

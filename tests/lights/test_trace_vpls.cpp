@@ -11,7 +11,7 @@ namespace lumicut {
 
 namespace {
 
-// A closed box of one albedo, with a point lamp inside.
+// A closed box of one albedo, with a point light inside.
 std::unique_ptr<Scene> closed_box(float albedo) {
   auto scene = std::make_unique<Scene>(Scene::Config{});
   scene->set_materials({test::diffuse(albedo, albedo, albedo)});

@@ -1,4 +1,4 @@
-// A host that describes something of everything: textures, gloss, a coat, a profile, an environment, two lamps, passes. Each
+// A host that describes something of everything: textures, gloss, a coat, a profile, an environment, two lights, passes. Each
 // thing is kept apart, so that a test can change one.
 #pragma once
 

@@ -310,7 +310,7 @@ struct Floor {
     p.normal[1] = p.geometric_normal[1] = p.to_viewer[1] = 1;
     return p;
   }
-  // Direct light of one lamp: nothing bounces.
+  // Direct light of one light: nothing bounces.
   double radiance(const api::Device& device, const lumicut_light& light, const lumicut_point& p = point()) {
     scene.set_lights({light});
     scene.commit();
@@ -383,11 +383,11 @@ TEST(Units, AreaLampsOfPWattHaveRadiancePOver4Area) {
   for (const uint32_t type : {uint32_t{LUMICUT_RECTANGLE}, uint32_t{LUMICUT_DISK}}) {
     auto l = above(type, 5, 80);
     l.u[0] = 0.2f, l.v[2] = 0.1f;
-    // Far away a lamp of radiance P/(4A) and area A shines with P/4, whatever its shape. 0.2 % for its size at
+    // Far away a light of radiance P/(4A) and area A shines with P/4, whatever its shape. 0.2 % for its size at
     // distance 5.
     const double expected = kBrdf * 80 / 4 / 25;
     EXPECT_NEAR(f.radiance(device, l), expected, 2e-3 * expected);
-    // Scaled with its object in the world, the lamp keeps its power.
+    // Scaled with its object in the world, the light keeps its power.
     l.u[0] = 0.02f;
     EXPECT_NEAR(f.radiance(device, l), expected, 2e-3 * expected);
     l.unit = LUMICUT_RADIOMETRIC, l.value = 7;
@@ -582,7 +582,7 @@ TEST(Shade, ACoatAddsItsLobeToItsPointAndFramesShowTheSame) {
       }
       EXPECT_NEAR(lux_with[k], lux_without[k], 1e-4f * lux_without[k]) << "light that arrives, not the lobes";
     }
-    // The pixel nearest to the mirror image of the lamp, and one far from it.
+    // The pixel nearest to the mirror image of the light, and one far from it.
     const size_t near = 3 * (3 * kSide + 3), far = 0;
     EXPECT_GT(with[near], 1.2f * without[near]);
     EXPECT_LT(with[far], without[far]) << "what the coat reflects elsewhere is missing here";

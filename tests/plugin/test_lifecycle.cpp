@@ -33,7 +33,7 @@ long open_files() {
   return count;
 }
 
-// A point lamp whose table nobody had before.
+// A point light whose table nobody had before.
 void add_measured_lamp(const api::Scene& s, int of_its_own) {
   std::vector<float> vertical(20000), values(vertical.size(), 1.0f);
   for (size_t i = 0; i < vertical.size(); ++i) vertical[i] = 1e-4f * static_cast<float>(i);

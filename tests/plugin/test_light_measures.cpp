@@ -45,7 +45,7 @@ lumicut_light lamp_of(uint32_t type, float value, float height) {
   return l;
 }
 
-// The clamp, a twentieth of the scene's radius, is 3.5 here: lamps hang higher.
+// The clamp, a twentieth of the scene's radius, is 3.5 here: lights hang higher.
 TEST(Illuminance, OfAPointFallsWithTheSquareOfTheDistance) {
   for (const float height : {4.0f, 8.0f})
     EXPECT_NEAR(lux_below(lamp_of(LUMICUT_POINT, 10, height), "lightcuts") / (kLumenPerWatt * 10 / (height * height)),
@@ -83,7 +83,7 @@ TEST(Illuminance, IsZeroUnlessAskedFor) {
 
 class Groups : public testing::Test {
  protected:
-  // The box with its lamp in group 7, a point lamp in group 3, and a constant sky in group 0.
+  // The box with its light in group 7, a point light in group 3, and a constant sky in group 0.
   api::Scene scene_with(bool lamp_on, bool point_on) {
     api::Scene s(device_);
     s.set_materials(materials());
@@ -150,7 +150,7 @@ TEST_F(Groups, EachIsTheImageOfItsLampAlone) {
     into.resize(r.read("radiance").size());
     ASSERT_EQ(lumicut_render_read(r.get(), "radiance.3", nullptr, into.data()), LUMICUT_OK);
   }
-  // Direct light of a point lamp is one virtual light, whatever else there is.
+  // Direct light of a point light is one virtual light, whatever else there is.
   for (size_t k = 0; k < x.size(); ++k) ASSERT_NEAR(x[k], y[k], 1e-6f * (1 + x[k]));
 }
 

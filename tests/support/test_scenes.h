@@ -47,7 +47,7 @@ inline Material diffuse(float r, float g, float b) {
 }
 
 // A room of side 2 around the origin (times `scale`) with two blocks, a glossy floor, a coated wall, an upward area
-// lamp and a spot.
+// light and a spot.
 inline std::unique_ptr<Scene> make_room(float scale = 1.0f, const std::string& accel = kDefaultAccel) {
   auto scene = std::make_unique<Scene>(Scene::Config{accel, true});
   Material glossy = diffuse(0.3f, 0.3f, 0.3f);
