@@ -170,8 +170,14 @@ std::optional<ScatterSample> Bsdf::scatter(Rng& rng) const {
   const float survive = std::min(1.0f, q_specular + q_layers);
   if (!(choice < survive)) return {};
   const float p_specular = survive * q_specular / (q_specular + q_layers);
-  if (choice < p_specular)
-    return ScatterSample{specular->direction, specular->weight, 1.0f / p_specular, specular->flags};
+  if (choice < p_specular) {
+    // Camera paths leave out that refraction changes radiance by the square of the indices' ratio; so that both kinds of
+    // paths give one image, light paths carry it. [Veach 1997, 5.2]
+    const bool refracted = (specular->flags & kTransmitted) != 0;
+    const float ratio = behind_ ? 1.0f / parameters_.ior : parameters_.ior;
+    const float narrowed = refracted ? 1.0f / (ratio * ratio) : 1.0f;
+    return ScatterSample{specular->direction, specular->weight, narrowed / p_specular, specular->flags};
+  }
   const float share = two ? above / (above + beneath) : 0.0f;
   const bool coat = two && rng.next_float() < share;
   const auto s = PointBsdf(layers_[coat ? 1 : 0]).sample(lobe, u, v);

@@ -70,7 +70,8 @@ class Bsdf {
   // more: what others lose is given back); solid angles that refraction narrows are not in it, since a closed body
   // widens them again.
   std::optional<BsdfSample> sample_specular(float choice, float u, float v) const;
-  // One direction out of all lobes with Russian roulette by what they reflect, which keeps the flux of all paths alike.
+  // One direction out of all lobes for a light path, with Russian roulette by what they reflect, which keeps the flux of
+  // all paths alike but for that factor of refraction: here it is, so that a single sheet looks as camera paths see it.
   std::optional<ScatterSample> scatter(Rng& rng) const;
   PathChoice choose(Rng& rng) const;
 

@@ -77,7 +77,7 @@ HWY_INLINE V BoundOfSolidAngle(D d, const LightNode& node, V dist2) {
   dist2 = hn::Max(dist2, hn::Set(d, 1e-30f));
   const V cosine = hn::Sqrt(hn::Max(hn::Zero(d), hn::Sub(one, hn::Div(r2, dist2))));
   const V outside = hn::Div(two, hn::Mul(dist2, hn::Add(one, cosine)));
-  const float most = 4.0f / std::max(node.least_radius * node.least_radius, 1e-30f);
+  const float most = 4.0f / std::max(node.least_distance2, 1e-30f);
   const V inside = hn::Min(hn::Div(hn::Set(d, 64.0f / 27.0f), dist2), hn::Set(d, most));
   return hn::IfThenElse(hn::Ge(dist2, r2), hn::Min(outside, hn::Set(d, most)), inside);
 }
@@ -111,7 +111,7 @@ HWY_INLINE V3 GrownBySpheres(D d, const V3& half, const LightNode& node) {
 // bounded in their own frames each.
 struct BoundsKernel {
   template <VplKind kKind, Lobes kLobes>
-  static HWY_INLINE void Run(const LightNode& node, const PointBlock& block, float clamp2, float* HWY_RESTRICT bounds) {
+  static HWY_INLINE void Run(const LightNode& node, const PointBlock& block, float* HWY_RESTRICT bounds) {
     const D d;
     const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
     constexpr bool kSpheres = kKind == VplKind::sphere;
@@ -135,7 +135,8 @@ struct BoundsKernel {
         if constexpr (kSpheres)
           geometry = BoundOfSolidAngle(d, node, dist2);
         else
-          geometry = hn::Div(one, hn::Max(hn::Max(Dist2(d, to_center, half), hn::Set(d, clamp2)), hn::Set(d, 1e-30f)));
+          geometry = hn::Div(
+              one, hn::Max(hn::Max(Dist2(d, to_center, half), hn::Set(d, node.least_distance2)), hn::Set(d, 1e-30f)));
         if constexpr (kKind == VplKind::oriented || kKind == VplKind::spot || kSpheres) {
           // From the lights to the point: the box turned around.
           const V x = hn::Neg(Dot(to_center, Set3(d, node.tangent))),
@@ -189,8 +190,8 @@ struct BoundsKernel {
 };
 
 // light_node_bounds, to be inlined.
-HWY_INLINE void NodeBounds(const LightNode& node, const PointBlock& block, float clamp2, float* HWY_RESTRICT bounds) {
-  RunKernel<BoundsKernel>(node.kind, block.lobes, node, block, clamp2, bounds);
+HWY_INLINE void NodeBounds(const LightNode& node, const PointBlock& block, float* HWY_RESTRICT bounds) {
+  RunKernel<BoundsKernel>(node.kind, block.lobes, node, block, bounds);
 }
 
 }  // namespace lumicut::HWY_NAMESPACE

@@ -10,9 +10,7 @@ HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-void LightNodeBounds(const LightNode& node, const PointBlock& block, float clamp2, float* bounds) {
-  NodeBounds(node, block, clamp2, bounds);
-}
+void LightNodeBounds(const LightNode& node, const PointBlock& block, float* bounds) { NodeBounds(node, block, bounds); }
 
 }  // namespace lumicut::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -21,8 +19,8 @@ HWY_AFTER_NAMESPACE();
 namespace lumicut {
 HWY_EXPORT(LightNodeBounds);
 
-void light_node_bounds(const LightNode& node, const PointBlock& block, float clamp2, float* bounds) {
-  HWY_DYNAMIC_DISPATCH(LightNodeBounds)(node, block, clamp2, bounds);
+void light_node_bounds(const LightNode& node, const PointBlock& block, float* bounds) {
+  HWY_DYNAMIC_DISPATCH(LightNodeBounds)(node, block, bounds);
 }
 
 void PointBlock::load(const ShadePoints& points, size_t first) {

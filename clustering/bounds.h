@@ -22,8 +22,8 @@ struct alignas(64) PointBlock {
 };
 
 // For each point: an upper bound of the luminance of the radiance that any way of summing the node's lights can give
-// (each light's own, or the representative's at the summed intensity), visibility taken as 1. `clamp2` as in
-// light_points. Conservative: tested against all pairs; 0 only where no light of the node reaches.
-void light_node_bounds(const LightNode& node, const PointBlock& block, float clamp2, float* bounds);
+// (each light's own, or the representative's at the summed intensity), visibility taken as 1.
+// Conservative: tested against all pairs; 0 only where no light of the node reaches.
+void light_node_bounds(const LightNode& node, const PointBlock& block, float* bounds);
 
 }  // namespace lumicut

@@ -55,7 +55,7 @@ HWY_INLINE V Geometry(D d, const Vpl& light, Falloff falloff, const V3& position
     const V dist2 = hn::Max(Dot(v, v), hn::Set(d, 1e-30f));
     const V inverse = hn::Div(hn::Set(d, 1.0f), hn::Sqrt(dist2));
     to_light = {hn::Mul(v.x, inverse), hn::Mul(v.y, inverse), hn::Mul(v.z, inverse)};
-    geometry = hn::Div(hn::Set(d, 1.0f), hn::Max(dist2, hn::Set(d, falloff.clamp2)));
+    geometry = hn::Div(hn::Set(d, 1.0f), hn::Max(dist2, hn::Set(d, light.clamp2)));
     if constexpr (kKind == VplKind::oriented) {
       geometry = hn::Mul(geometry, hn::Max(zero, hn::Neg(Dot(light_normal, to_light))));
     } else if constexpr (kKind == VplKind::spot) {

@@ -15,7 +15,7 @@ struct Cluster {
   Aabb positions, directions;
   Rgb intensity{};
   float widest_spot = 1.0f;  // least cosine of the spots' own opening
-  float least_radius = 0.0f, largest_radius = 0.0f;
+  float least_distance2 = 0.0f, largest_radius = 0.0f;
 };
 
 Cluster merge(const Cluster& a, const Cluster& b) {
@@ -23,7 +23,7 @@ Cluster merge(const Cluster& a, const Cluster& b) {
           merge(a.directions, b.directions),
           a.intensity + b.intensity,
           std::min(a.widest_spot, b.widest_spot),
-          std::min(a.least_radius, b.least_radius),
+          std::min(a.least_distance2, b.least_distance2),
           std::max(a.largest_radius, b.largest_radius)};
 }
 
@@ -105,7 +105,7 @@ LightNode make_node(const Cluster& c, VplKind kind) {
   LightNode n;
   n.kind = kind;
   n.intensity = c.intensity;
-  n.least_radius = c.least_radius, n.largest_radius = c.largest_radius;
+  n.least_distance2 = c.least_distance2, n.largest_radius = c.largest_radius;
   if (kind != VplKind::directional)
     n.center = c.positions.center(), n.half = max(c.positions.hi - n.center, n.center - c.positions.lo);
   if (kind != VplKind::omni) {
@@ -156,7 +156,8 @@ void LightTree::add_kind(const std::vector<Vpl>& lights, const std::vector<uint3
     c.positions.extend(v.position);
     c.directions.extend(v.normal);
     c.intensity = v.intensity;
-    if (v.kind == VplKind::sphere) c.least_radius = c.largest_radius = v.radius();
+    c.least_distance2 = v.clamp2;
+    if (v.kind == VplKind::sphere) c.largest_radius = v.radius(), c.least_distance2 = v.radius() * v.radius();
     // The profile of a narrowed area light ends where its cosine does.
     if (v.kind == VplKind::spot)
       c.widest_spot = v.profile == 0 && v.spot_cosine > 0.0f ? std::max(0.0f, v.cos_outer()) : v.cos_outer();

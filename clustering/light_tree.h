@@ -24,7 +24,8 @@ struct LightNode {
   uint32_t first_child = kNoNode;           // children are first_child and first_child + 1; kNoNode: a leaf
   uint32_t light = 0;                       // the representative, index into LightTree::lights (slot 0)
   VplKind kind = VplKind::omni;
-  float least_radius = 0.0f, largest_radius = 0.0f;  // spheres alone
+  float least_distance2 = 0.0f;  // below which none of its lights comes nearer, squared; spheres: least radius²
+  float largest_radius = 0.0f;   // spheres alone
 
   bool leaf() const { return first_child == kNoNode; }
 };

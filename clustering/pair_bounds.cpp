@@ -40,7 +40,7 @@ HWY_INLINE V3 LargestGloss(LobeList<L, Rest...>, D d, const PointNodes& nodes, s
 
 struct PairKernel {
   template <VplKind kKind, Lobes kLobes>
-  static HWY_INLINE void Run(const LightNode& node, const PointNodes& nodes, float clamp2, float* HWY_RESTRICT bounds) {
+  static HWY_INLINE void Run(const LightNode& node, const PointNodes& nodes, float* HWY_RESTRICT bounds) {
     const D d;
     const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
     const V3 axis = Set3(d, node.axis);
@@ -62,7 +62,8 @@ struct PairKernel {
           geometry = BoundOfSolidAngle(d, node, dist2), across = SpheresAcross(d, node, dist2), places = half;
           half = GrownBySpheres(d, half, node);
         } else {
-          geometry = hn::Div(one, hn::Max(hn::Max(Dist2(d, to_center, half), hn::Set(d, clamp2)), hn::Set(d, 1e-30f)));
+          geometry = hn::Div(
+              one, hn::Max(hn::Max(Dist2(d, to_center, half), hn::Set(d, node.least_distance2)), hn::Set(d, 1e-30f)));
         }
         if constexpr (kKind == VplKind::oriented || kKind == VplKind::spot || kKind == VplKind::sphere) {
           // From the lights to the points: the box turned around.
@@ -125,16 +126,16 @@ struct PairKernel {
   }
 };
 
-void PairBounds(const LightNode& node, const PointNodes& nodes, float clamp2, float* bounds) {
-  RunKernel<PairKernel>(node.kind, nodes.lobes, node, nodes, clamp2, bounds);
+void PairBounds(const LightNode& node, const PointNodes& nodes, float* bounds) {
+  RunKernel<PairKernel>(node.kind, nodes.lobes, node, nodes, bounds);
 }
 
-void PairDistances2(const LightNode& node, const PointNodes& nodes, float clamp2, float* HWY_RESTRICT distances2) {
+void PairDistances2(const LightNode& node, const PointNodes& nodes, float* HWY_RESTRICT distances2) {
   const D d;
   for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
     const V3 to_center = Sub3(Set3(d, node.center), Load3(d, nodes.center, i));
     const V3 half = Add3(Set3(d, node.half), Load3(d, nodes.half, i));
-    hn::StoreU(hn::Max(Dist2(d, to_center, half), hn::Set(d, clamp2)), d, distances2 + i);
+    hn::StoreU(hn::Max(Dist2(d, to_center, half), hn::Set(d, node.least_distance2)), d, distances2 + i);
   }
 }
 
@@ -146,16 +147,16 @@ namespace lumicut {
 HWY_EXPORT(PairBounds);
 HWY_EXPORT(PairDistances2);
 
-void pair_bounds(const LightNode& node, const PointNodes& nodes, float clamp2, float* bounds) {
-  HWY_DYNAMIC_DISPATCH(PairBounds)(node, nodes, clamp2, bounds);
+void pair_bounds(const LightNode& node, const PointNodes& nodes, float* bounds) {
+  HWY_DYNAMIC_DISPATCH(PairBounds)(node, nodes, bounds);
 }
 
-void pair_distances2(const LightNode& node, const PointNodes& nodes, float clamp2, float* distances2) {
+void pair_distances2(const LightNode& node, const PointNodes& nodes, float* distances2) {
   if (node.kind == VplKind::directional) {
     std::fill(distances2, distances2 + kLanes, std::numeric_limits<float>::infinity());
     return;
   }
-  HWY_DYNAMIC_DISPATCH(PairDistances2)(node, nodes, clamp2, distances2);
+  HWY_DYNAMIC_DISPATCH(PairDistances2)(node, nodes, distances2);
 }
 
 void PointNodes::set(size_t lane, const ShadePoints& points, size_t first, size_t count) {

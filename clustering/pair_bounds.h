@@ -34,12 +34,12 @@ struct alignas(64) PointNodes {
 };
 
 // For each lane: an upper bound of the luminance of the radiance that any way of summing the node's lights can give to
-// any point of the cluster, visibility taken as 1. `clamp2` as in light_points. The distance is that of the boxes,
-// never below the clamp. Conservative: tested against all pairs; 0 only where no light reaches any point.
-void pair_bounds(const LightNode& node, const PointNodes& nodes, float clamp2, float* bounds);
+// any point of the cluster, visibility taken as 1. The distance is that of the boxes, never
+// below the lights' least clamp. Conservative: tested against all pairs; 0 only where no light reaches any point.
+void pair_bounds(const LightNode& node, const PointNodes& nodes, float* bounds);
 
 // For each lane: squared distance of the boxes of positions over the squared clamp distance's floor; directional lights
 // are infinitely far.
-void pair_distances2(const LightNode& node, const PointNodes& nodes, float clamp2, float* distances2);
+void pair_distances2(const LightNode& node, const PointNodes& nodes, float* distances2);
 
 }  // namespace lumicut

@@ -28,7 +28,8 @@ enum class Stage : uint32_t {
   test,
   octree_shift,
   eye_ray,
-  path
+  path,
+  nearby_lights
 };
 
 // PCG32 (XSH-RR). [O'Neill 2014]

@@ -100,11 +100,21 @@ uint32_t BallQueryTree::build(std::span<const double> points, uint32_t begin, ui
 }
 
 size_t BallQueryTree::nearest(const double* p, size_t k, uint32_t* index, double* dist2, Scratch& scratch) const {
+  return search<true>(p, k, index, dist2, scratch);
+}
+
+size_t BallQueryTree::nearest_distances(const double* p, size_t k, double* dist2, Scratch& scratch) const {
+  return search<false>(p, k, nullptr, dist2, scratch);
+}
+
+template <bool kTies>
+size_t BallQueryTree::search(const double* p, size_t k, uint32_t* index, double* dist2, Scratch& scratch) const {
   k = std::min(k, size());
   if (k == 0) return 0;
   const auto d = static_cast<size_t>(dim_);
   size_t count = 0;
   double worst = std::numeric_limits<double>::infinity(), reach = worst;  // the k-th squared distance, and its root
+  const auto within = [](double distance, double limit) { return kTies ? distance <= limit : distance < limit; };
   const auto to_centre = [&](uint32_t n) {
     const double* c = &centres_[n * d];
     double sum = 0;
@@ -128,19 +138,19 @@ size_t BallQueryTree::nearest(const double* p, size_t k, uint32_t* index, double
     uint32_t n = nodes.back();
     const double near = nears.back();
     nodes.pop_back(), nears.pop_back();
-    if (near > reach) continue;
+    if (!within(near, reach)) continue;
     while (nodes_[n].right != 0) {
       uint32_t a = n + 1, b = nodes_[n].right;
       double da = to_centre(a), db = to_centre(b);
       double na = da - nodes_[a].radius, nb = db - nodes_[b].radius;
       // Where the ball does not rule a child out, its box may.
-      if (na <= reach) na = std::max(na, to_box(a));
-      if (nb <= reach) nb = std::max(nb, to_box(b));
+      if (within(na, reach)) na = std::max(na, to_box(a));
+      if (within(nb, reach)) nb = std::max(nb, to_box(b));
       // Inside both balls the nearer centre goes first.
       if (std::max(na, 0.0) > std::max(nb, 0.0) || (na <= 0 && nb <= 0 && da > db)) std::swap(a, b), std::swap(na, nb);
-      if (nb <= reach) nodes.push_back(b), nears.push_back(nb);
+      if (within(nb, reach)) nodes.push_back(b), nears.push_back(nb);
       n = a;
-      if (na > reach) break;
+      if (!within(na, reach)) break;
     }
     if (nodes_[n].right != 0) continue;
     double sum[kBucket];
@@ -153,14 +163,22 @@ size_t BallQueryTree::nearest(const double* p, size_t k, uint32_t* index, double
     }
     const uint32_t* ids = &ids_[nodes_[n].bucket * kBucket];
     for (uint32_t i = 0; i < kBucket; ++i) {
-      if (!(sum[i] <= worst) || ids[i] == 0xffffffffu) continue;
-      if (count == k && sum[i] == worst && ids[i] > index[k - 1]) continue;
+      if (!within(sum[i], worst) || ids[i] == 0xffffffffu) continue;
+      if constexpr (kTies)
+        if (count == k && sum[i] == worst && ids[i] > index[k - 1]) continue;
       // Insertion into the sorted list: k is small.
       size_t at = count < k ? count++ : k - 1;
-      for (; at > 0 && (dist2[at - 1] > sum[i] || (dist2[at - 1] == sum[i] && index[at - 1] > ids[i])); --at)
-        dist2[at] = dist2[at - 1], index[at] = index[at - 1];
+      for (; at > 0; --at) {
+        if constexpr (kTies) {
+          if (!(dist2[at - 1] > sum[i] || (dist2[at - 1] == sum[i] && index[at - 1] > ids[i]))) break;
+          index[at] = index[at - 1];
+        } else if (!(dist2[at - 1] > sum[i])) {
+          break;
+        }
+        dist2[at] = dist2[at - 1];
+      }
       dist2[at] = sum[i];
-      index[at] = ids[i];
+      if constexpr (kTies) index[at] = ids[i];
       if (count == k) worst = dist2[k - 1], reach = std::sqrt(worst);
     }
   }

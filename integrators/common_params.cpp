@@ -24,19 +24,28 @@ ParamTable common_params() {
                             1024),
       of_virtual_lights(number<&P::direct_share>(
           "direct_share", "Direct share",
-          "Share of the virtual lights that is spent on the direct light of extended lamps", "", 0.01, 1)),
+          "Share of the virtual lights that is spent on the direct light of emitters with extent", "", 0.01, 1)),
       of_virtual_lights(number<&P::environment_vpls>(
           "environment_vpls", "Environment lights",
           "How many of the virtual lights stand for the environment; 0: its share of the power among those for direct "
           "light",
           "lights", 0, 1e8)),
-      of_virtual_lights(
-          number<&P::clamp_relative>("clamp_relative", "Clamp (relative)",
-                                     "No virtual light is taken to be nearer than this share of the scene's radius",
-                                     "of the scene's radius", 0, 1)),
+      of_virtual_lights(number<&P::clamp_lights>(
+          "clamp_lights", "Clamp",
+          "No virtual light is taken to be nearer than the distance within which about so many of ten thousand lie (of "
+          "others, as the 2/3 power of their number): more, and corners lose light; fewer, and bright dots show. 0: no "
+          "clamp",
+          "lights", 0, 1e6)),
+      of_virtual_lights(number<&P::clamp_relative>(
+          "clamp_relative", "Clamp (relative)",
+          "No virtual light is taken to be nearer than this share of the scene's radius, wherever it is; 0: as many "
+          "lights as above. For comparisons with other programs",
+          "of the scene's radius", 0, 1)),
       of_virtual_lights(number<&P::clamp_distance>(
           "clamp_distance", "Clamp distance",
-          "No virtual light is taken to be nearer than this; 0: use the relative clamp", "scene units", 0, 1e30)),
+          "No virtual light is taken to be nearer than this, wherever it is; 0: as above. For comparisons with other "
+          "programs",
+          "scene units", 0, 1e30)),
       of_virtual_lights(choice<&P::virtual_lights>(
           "virtual_lights", "Virtual lights are",
           "points, which leave bright dots on glossy surfaces and in corners; or spheres as wide as they lie apart: no "

@@ -16,8 +16,9 @@ struct CommonParams {
   uint32_t max_depth = 32;
   float direct_share = 0.25f;
   uint32_t environment_vpls = 0;  // 0: by power
-  double clamp_relative = 0.05;   // of the scene's radius
-  double clamp_distance = 0.0;    // scene units; 0: by the relative one
+  double clamp_lights = 40.0;     // that lie within the clamp
+  double clamp_relative = 0.0;    // of the scene's radius; 0: by the lights
+  double clamp_distance = 0.0;    // scene units; 0: by the others
   VirtualLights virtual_lights = VirtualLights::points;
   float sphere_scale = 1.0f;  // of the distance to the tenth nearest
   bool compensate = false;
@@ -25,6 +26,7 @@ struct CommonParams {
 };
 
 // Distance below which no light comes nearer, in scene units: clamp_distance, or clamp_relative of the scene's radius.
+// 0: it follows how densely they lie [render/clamp.h].
 float clamp_distance(const CommonParams& params, const Scene& scene);
 
 // sphere_scale where virtual lights are spheres, 0 where they are points.

@@ -9,11 +9,10 @@ namespace {
 
 class Exhaustive final : public Integrator {
  public:
-  void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext) override {
+  void prepare(const Scene& scene, const VplSet& vpls, const Params&, ShadeContext) override {
     scene_ = &scene;
     vpls_ = &vpls;
-    const float clamp = clamp_distance(params.common(), scene);
-    falloff_ = {clamp * clamp, vpls.profiles};
+    falloff_ = Falloff(vpls.profiles);
   }
 
   void shade(const ShadePoints& points, std::span<Rgb> radiance, std::span<PointCounts> counts,
@@ -52,7 +51,7 @@ class Exhaustive final : public Integrator {
  private:
   const Scene* scene_ = nullptr;
   const VplSet* vpls_ = nullptr;
-  Falloff falloff_ = 0.0f;
+  Falloff falloff_;
 };
 
 }  // namespace

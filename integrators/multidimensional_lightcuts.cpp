@@ -81,13 +81,12 @@ class MultidimensionalLightcuts final : public Integrator {
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
     const auto& own = params.own<MultidimensionalParams>();
-    const float clamp = clamp_distance(params.common(), scene);
-    falloff_ = {clamp * clamp, vpls.profiles};
+    falloff_ = Falloff(vpls.profiles);
     error_ = own.error;
     max_cut_ = own.max_cut == 0 ? std::numeric_limits<uint32_t>::max() : own.max_cut;
     seed_ = params.common().seed;
     const PhaseTimer timer(context.stats, "light tree");
-    tree_ = LightTree::build(vpls.lights, {LightTree::Method::agglomerative, 2.0f * scene.radius(), 1, seed_},
+    tree_ = LightTree::build(vpls.lights, {LightTree::Method::agglomerative, 2.0f * scene.extent().radius(), 1, seed_},
                              context.progress);
     context.stats.set_value("light_tree_bytes", static_cast<double>(tree_.bytes()));
   }
@@ -187,7 +186,7 @@ class MultidimensionalLightcuts final : public Integrator {
     const uint32_t index = work.allocate();
     Pairs& e = work.pairs[index];
     e.node = node_index, e.block = block_index;
-    pair_bounds(node, block.nodes, falloff_.clamp2, e.bound);
+    pair_bounds(node, block.nodes, e.bound);
     e.active = 0;
     for (uint32_t i = 0; i < kLanes; ++i) {
       if (!(active >> i & 1)) continue;
@@ -246,7 +245,7 @@ class MultidimensionalLightcuts final : public Integrator {
       for (size_t i = 0; i < pixel.count; ++i) own.push(points.get(pixel.first + i));
       own.finish();
       Progress unseen;  // a pixel is soon done
-      for (uint32_t i : PointTree::build(own, scene_->radius() / 8.0f, unseen).order) sorted.push(own.get(i));
+      for (uint32_t i : PointTree::build(own, scene_->extent().radius() / 8.0f, unseen).order) sorted.push(own.get(i));
     }
     sorted.finish();
     std::vector<uint32_t> lanes(runs.size());
@@ -304,7 +303,7 @@ class MultidimensionalLightcuts final : public Integrator {
 
   const Scene* scene_ = nullptr;
   LightTree tree_;
-  Falloff falloff_ = 0.0f;
+  Falloff falloff_;
   float error_ = 0.02f;
   uint32_t max_cut_ = 0;
   uint64_t seed_ = 1;

@@ -27,7 +27,7 @@ class PathTracer final : public Integrator {
   void prepare(const Scene& scene, const VplSet&, const Params& params, ShadeContext context) override {
     scene_ = &scene;
     sampler_ = std::make_unique<LightSampler>(scene, &context.progress);
-    lamps_ = std::make_unique<LightSurfaces>(scene);
+    light_surfaces_ = std::make_unique<LightSurfaces>(scene);
     samples_ = params.own<PathTracerParams>().samples;
     max_depth_ = params.common().max_depth;
     seed_ = params.common().seed;
@@ -129,14 +129,14 @@ class PathTracer final : public Integrator {
     if (!delta_.empty()) {
       const size_t i = delta_.sample(path.rng.next_float());
       const Vpl& light = sampler_->delta_lights()[i];
-      add_shadow(path, light,
-                 light_point(light, light.intensity / static_cast<float>(delta_.pmf(i)), {0.0f, scene_->profiles()},
+      add_shadow(path, light, 0.0f,
+                 light_point(light, light.intensity / static_cast<float>(delta_.pmf(i)), Falloff(scene_->profiles()),
                              path.point),
                  rays, shadows);
     }
     if (!sampler_->has_extended() && !sampler_->has_environment()) return;
     const DirectSample s = sampler_->sample_light(path.rng);
-    Rgb light = light_point(s.vpl, s.vpl.intensity, {0.0f, scene_->profiles()}, path.point);
+    Rgb light = light_point(s.vpl, s.vpl.intensity, Falloff(scene_->profiles()), path.point);
     if (!(max_component(light) > 0.0f)) return;
     if (s.seen_by_rays) {
       const bool far = s.vpl.kind == VplKind::directional;
@@ -146,10 +146,10 @@ class PathTracer final : public Integrator {
       const double density = far ? s.density : s.density * length2(v) / cosine;
       light = light * power_heuristic(density, PointBsdf(path.point).pdf(to_light));
     }
-    add_shadow(path, s.vpl, light, rays, shadows);
+    add_shadow(path, s.vpl, s.offset, light, rays, shadows);
   }
 
-  void add_shadow(const Path& path, const Vpl& light, const Rgb& value, std::vector<Ray>& rays,
+  void add_shadow(const Path& path, const Vpl& light, float offset, const Rgb& value, std::vector<Ray>& rays,
                   std::vector<Shadow>& shadows) const {
     if (!(max_component(value) > 0.0f) || !is_finite(value)) return;
     Ray ray;
@@ -158,8 +158,7 @@ class PathTracer final : public Integrator {
       ray.dir = -light.normal;
     } else {
       // Emissive meshes block: the ray ends before them.
-      const Vec3f end =
-          light.kind == VplKind::oriented ? light.position + light.normal * scene_->epsilon() : light.position;
+      const Vec3f end = light.kind == VplKind::oriented ? light.position + light.normal * offset : light.position;
       ray.dir = end - ray.org, ray.tfar = 1.0f;
     }
     rays.push_back(ray);
@@ -169,10 +168,10 @@ class PathTracer final : public Integrator {
   // What the path's ray found: adds what it emits; true where the path goes on from there.
   bool arrive(Path& path, const RayHit& hit, uint32_t depth, std::span<Rgb> radiance) const {
     Rgb& sum = radiance[path.index];
-    if (!lamps_->empty())
-      lamps_->for_each_hit(hit.ray.org, path.direction, hit.ray.tfar, [&](const LightSurfaces::Hit& lamp) {
-        const double density = sampler_->lamp_density(lamp.lamp) * double{lamp.t} * lamp.t / lamp.cosine;
-        sum += path.weight * lamp.radiance * (path.specular ? 1.0f : power_heuristic(path.pdf, density));
+    if (!light_surfaces_->empty())
+      light_surfaces_->for_each_hit(hit.ray.org, path.direction, hit.ray.tfar, [&](const LightSurfaces::Hit& seen) {
+        const double density = sampler_->light_density(seen.light) * double{seen.t} * seen.t / seen.cosine;
+        sum += path.weight * seen.radiance * (path.specular ? 1.0f : power_heuristic(path.pdf, density));
       });
     if (hit.hit.geom == kNoId) {
       const Rgb light = scene_->environment_radiance(path.direction);
@@ -181,9 +180,9 @@ class PathTracer final : public Integrator {
                (path.specular ? 1.0f : power_heuristic(path.pdf, sampler_->environment_density(path.direction)));
       return false;
     }
-    // A ray that meets its own surface at once left it below the horizon of the triangle.
-    if (!path.specular && hit.ray.tfar < 4.0f * scene_->epsilon()) return false;
     const SurfaceInteraction at = scene_->interaction(hit, path.point.pixel);
+    // A ray that meets its own surface at once left it below the horizon of the triangle.
+    if (!path.specular && at.t < 4.0f * at.offset) return false;
     if (max_component(at.emitted) > 0.0f) {
       const double cosine = std::max(1e-9f, std::abs(dot(at.geometric_normal, at.to_viewer)));
       const double density = sampler_->mesh_density(at) * double{at.t} * at.t / cosine;
@@ -216,7 +215,7 @@ class PathTracer final : public Integrator {
 
   const Scene* scene_ = nullptr;
   std::unique_ptr<LightSampler> sampler_;
-  std::unique_ptr<LightSurfaces> lamps_;
+  std::unique_ptr<LightSurfaces> light_surfaces_;
   DiscreteDistribution delta_;
   uint32_t samples_ = 1, max_depth_ = 32;
   uint64_t seed_ = 1;

@@ -26,8 +26,7 @@ class RowColumnSampling final : public Integrator {
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
     const auto& own = params.own<RowColumnParams>();
-    const float clamp = clamp_distance(params.common(), scene);
-    falloff_ = {clamp * clamp, vpls.profiles};
+    falloff_ = Falloff(vpls.profiles);
     rows_ = own.rows;
     columns_ = own.columns;
     sampled_ = own.sampled;
@@ -109,7 +108,7 @@ class RowColumnSampling final : public Integrator {
   const Scene* scene_ = nullptr;
   std::vector<Vpl> lights_;
   std::vector<float> times_;
-  Falloff falloff_ = 0.0f;
+  Falloff falloff_;
   double sampled_ = 0;
   size_t rows_ = 0, columns_ = 0;
   uint64_t seed_ = 1;

@@ -42,12 +42,11 @@ class StochasticLightcuts final : public Integrator {
  public:
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
-    const float clamp = clamp_distance(params.common(), scene);
-    falloff_ = {clamp * clamp, vpls.profiles};
+    falloff_ = Falloff(vpls.profiles);
     size_ = params.own<StochasticParams>().lights;
     seed_ = params.common().seed;
     const PhaseTimer timer(context.stats, "light tree");
-    tree_ = LightTree::build(vpls.lights, {LightTree::Method::agglomerative, 2.0f * scene.radius(), 1, seed_},
+    tree_ = LightTree::build(vpls.lights, {LightTree::Method::agglomerative, 2.0f * scene.extent().radius(), 1, seed_},
                              context.progress);
     // Leaves of a node lie together: a range of lights, and sums of luminance up to each, draw one by its intensity.
     const size_t n = tree_.node_count();
@@ -106,7 +105,7 @@ class StochasticLightcuts final : public Integrator {
     work.heap.clear(), work.leaves.clear();
     const auto add = [&](uint32_t index) {
       alignas(64) float bound[kLanes];
-      light_node_bounds(tree_.node(index), work.block, falloff_.clamp2, bound);
+      light_node_bounds(tree_.node(index), work.block, bound);
       ++evaluated;
       float key = 0.0f;
       for (size_t i = 0; i < count; ++i) key += bound[i];
@@ -175,7 +174,7 @@ class StochasticLightcuts final : public Integrator {
       const LightNode& node = tree_.node(index);
       if (node.kind == VplKind::directional) break;
       const Vec3f to_center = node.center - point.position;
-      const float least2 = node.kind == VplKind::sphere ? node.least_radius * node.least_radius : falloff_.clamp2;
+      const float least2 = node.least_distance2;
       if (length2(node.half) < kSmall2 * std::max(length2(to_center), least2)) break;
       const Weights a = weights(tree_.node(node.first_child), point),
                     b = weights(tree_.node(node.first_child + 1), point);
@@ -224,7 +223,7 @@ class StochasticLightcuts final : public Integrator {
       if (!(emitted > 0.0f)) return {0.0f, 0.0f};
     }
     const Vec3f a{std::abs(v.x), std::abs(v.y), std::abs(v.z)};
-    const float least2 = node.kind == VplKind::sphere ? node.least_radius * node.least_radius : falloff_.clamp2;
+    const float least2 = node.least_distance2;
     const float near2 = std::max(length2(max(a - node.half, Vec3f{})), least2),
                 far2 = std::max(length2(a + node.half), least2);
     const float w = luminance(node.intensity) * cosine * reflected * emitted;
@@ -237,7 +236,7 @@ class StochasticLightcuts final : public Integrator {
   LightTree tree_;
   std::vector<Range> ranges_;  // of the lights below each node
   std::vector<double> upto_;   // luminance of the lights before each
-  Falloff falloff_ = 0.0f;
+  Falloff falloff_;
   size_t size_ = 0;
   uint64_t seed_ = 1;
 };

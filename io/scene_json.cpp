@@ -88,7 +88,7 @@ class SceneReader {
     if (environment) read_environment(*environment);
     if (meshes)
       for (const auto& mesh : meshes->elements()) read_mesh(mesh);
-    std::move(lamps_.begin(), lamps_.end(), std::back_inserter(scene_.meshes));
+    std::move(visible_lights_.begin(), visible_lights_.end(), std::back_inserter(scene_.meshes));
     if (scene_.meshes.empty()) root.value().fail("has neither meshes nor visible lights: there is nothing to see");
     check_lit();
     scene_.file = variables_.hide(path_);
@@ -566,7 +566,7 @@ class SceneReader {
 
   // A point light with the file's intensities; a spot cuts its cone out of them.
   void read_profile(JsonObject& object, const JsonValue& file, lumicut_light& light) {
-    if (light.radius > 0) object.need("radius").fail("a lamp with \"ies\" is a point: leave \"radius\" out");
+    if (light.radius > 0) object.need("radius").fail("a light with \"ies\" is a point: leave \"radius\" out");
     const Vec axis = direction(object.need("direction"));
     store(light.direction, axis);
     // Horizontal angle 0 lies towards x; `rotation` turns it the way horizontal angles go.
@@ -685,7 +685,7 @@ class SceneReader {
       m.emission[c] = static_cast<float>(double{light.color[c]} * radiance);
     }
     mesh.materials.assign(mesh.indices.size() / 3, add_material("light " + mesh.name, m));
-    lamps_.push_back(std::move(mesh));
+    visible_lights_.push_back(std::move(mesh));
   }
 
   void read_environment(const JsonValue& value) {
@@ -774,7 +774,7 @@ class SceneReader {
   SceneData scene_;
   TextureStore textures_;
   std::map<std::string, uint32_t> by_name_;
-  std::vector<Mesh> lamps_;  // visible lights: after all other meshes
+  std::vector<Mesh> visible_lights_;  // visible lights: after all other meshes
   bool z_up_ = false;
   double scale_ = 1;
 };

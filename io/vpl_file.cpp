@@ -16,14 +16,21 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "VPL files are little-endian and copied as they are");
 
 constexpr char kMagic[8] = {'L', 'U', 'M', 'I', 'V', 'P', 'L', '\n'};
-constexpr uint32_t kVersion = 1;
+constexpr uint32_t kVersion = 2;
 
+// Version 1 ends before emitter_samples, and its records before the origin.
 struct Header {
   char magic[8];
   uint32_t version, record_size;
-  uint64_t count, reserved;
+  uint64_t count, light_paths, emitter_samples;
 };
-static_assert(sizeof(Header) == 32 && sizeof(lumicut_vpl) == 64);
+struct Record {
+  lumicut_vpl light;
+  lumicut_vpl_origin origin;
+};
+constexpr size_t kHeaderSize[] = {offsetof(Header, emitter_samples), sizeof(Header)};
+constexpr size_t kRecordSize[] = {offsetof(Record, origin), sizeof(Record)};
+static_assert(kHeaderSize[0] == 32 && kHeaderSize[1] == 40 && kRecordSize[0] == 64 && kRecordSize[1] == 76);
 
 struct PeerRecord {
   float position[3], minus_normal[3], intensity[3];
@@ -36,8 +43,12 @@ bool all_finite(const float* values, int n) {
   return true;
 }
 
+[[noreturn]] void fail_light(const std::string& path, uint64_t index, const std::string& text) {
+  throw FileError(path, fmt::format("light {}: {}", index, text));
+}
+
 void check(const std::string& path, uint64_t index, lumicut_vpl& light) {
-  const auto fail = [&](const std::string& text) { throw FileError(path, fmt::format("light {}: {}", index, text)); };
+  const auto fail = [&](const std::string& text) { fail_light(path, index, text); };
   const auto shown = [](const float* v) { return fmt::format("({}, {}, {})", v[0], v[1], v[2]); };
   if (light.kind > LUMICUT_VPL_SPHERE) fail(fmt::format("kind is {}, but must be 0 to 4", light.kind));
   if (light.kind != LUMICUT_VPL_DIRECTIONAL && !all_finite(light.position, 3))
@@ -58,63 +69,103 @@ void check(const std::string& path, uint64_t index, lumicut_vpl& light) {
     for (float& n : light.normal) n = static_cast<float>(double{n} / length);
 }
 
-}  // namespace
-
-std::vector<lumicut_vpl> read_vpls(const std::string& path) {
-  const std::string bytes = read_whole_file(path, uint64_t{64} << 30);
-  std::vector<lumicut_vpl> lights;
-  Header header{};
-  if (bytes.size() >= sizeof(kMagic) && std::memcmp(bytes.data(), kMagic, sizeof(kMagic)) == 0) {
-    if (bytes.size() < sizeof(header))
-      throw FileError(path, fmt::format("ends within its header ({} bytes)", bytes.size()));
-    std::memcpy(&header, bytes.data(), sizeof(header));
-    if (header.version != kVersion)
-      throw FileError(path, fmt::format("version is {}, but {} is read", header.version, kVersion));
-    if (header.record_size != sizeof(lumicut_vpl))
-      throw FileError(path, fmt::format("record size is {}, but must be {}", header.record_size, sizeof(lumicut_vpl)));
-    const uint64_t room = bytes.size() - sizeof(header);
-    if (room % sizeof(lumicut_vpl) != 0 || room / sizeof(lumicut_vpl) != header.count)
-      throw FileError(path, fmt::format("says {} lights, but holds {} bytes of them, {} each", header.count, room,
-                                        sizeof(lumicut_vpl)));
-    lights.resize(header.count);
-    if (header.count > 0) std::memcpy(lights.data(), bytes.data() + sizeof(header), room);
-  } else {
-    // The peer's: a count and bare records of position, MINUS the normal, intensity.
-    uint64_t count = 0;
-    if (bytes.size() >= 8) std::memcpy(&count, bytes.data(), 8);
-    const uint64_t room = bytes.size() < 8 ? 0 : bytes.size() - 8;
-    if (bytes.size() < 8 || room % sizeof(PeerRecord) != 0 || room / sizeof(PeerRecord) != count)
-      throw FileError(
-          path,
-          fmt::format(
-              "is no VPL file: neither starts with LUMIVPL, nor do its {} bytes hold a count and as many records of 36",
-              bytes.size()));
-    lights.resize(count);
-    for (uint64_t i = 0; i < count; ++i) {
-      PeerRecord record;
-      std::memcpy(&record, bytes.data() + 8 + i * sizeof(record), sizeof(record));
-      lumicut_vpl& light = lights[i] = {};
-      light.kind = LUMICUT_VPL_ORIENTED;
-      for (int k = 0; k < 3; ++k) {
-        light.position[k] = record.position[k];
-        light.normal[k] = -record.minus_normal[k];
-        light.intensity[k] = record.intensity[k];
-      }
-    }
-  }
-  for (uint64_t i = 0; i < lights.size(); ++i) check(path, i, lights[i]);
-  return lights;
+void check(const std::string& path, uint64_t index, const lumicut_vpl_origin& origin) {
+  const auto fail = [&](const std::string& text) { fail_light(path, index, text); };
+  const bool area = origin.source == LUMICUT_SOURCE_AREA;
+  if (origin.source > LUMICUT_SOURCE_AREA) fail(fmt::format("source is {}, but must be 0 to 2", origin.source));
+  if (!std::isfinite(origin.offset) || origin.offset < 0)
+    fail(fmt::format("offset is {}, but must be finite and not negative", origin.offset));
+  if (!std::isfinite(origin.area) || (area ? origin.area <= 0 : origin.area != 0))
+    fail(fmt::format("area is {}, but must be {}", origin.area, area ? "finite and above 0" : "0 for its source"));
 }
 
-void write_vpls(const std::string& path, const lumicut_vpl* lights, uint64_t count) {
+// A file that starts with our name.
+api::VplSet read_own(const std::string& path, const std::string& bytes) {
+  Header header{};
+  const auto ends_early = [&] {
+    throw FileError(path, fmt::format("ends within its header ({} bytes)", bytes.size()));
+  };
+  if (bytes.size() < kHeaderSize[0]) ends_early();
+  std::memcpy(&header, bytes.data(), kHeaderSize[0]);
+  if (header.version < 1 || header.version > kVersion)
+    throw FileError(path, fmt::format("version is {}, but 1 to {} are read", header.version, kVersion));
+  const size_t header_size = kHeaderSize[header.version - 1], record_size = kRecordSize[header.version - 1];
+  if (header.record_size != record_size)
+    throw FileError(path, fmt::format("record size is {}, but must be {}", header.record_size, record_size));
+  if (bytes.size() < header_size) ends_early();
+  std::memcpy(&header, bytes.data(), header_size);
+  const uint64_t room = bytes.size() - header_size;
+  if (room % record_size != 0 || room / record_size != header.count)
+    throw FileError(
+        path, fmt::format("says {} lights, but holds {} bytes of them, {} each", header.count, room, record_size));
+  api::VplSet set;
+  set.lights.reserve(header.count), set.origins.reserve(header.count);
+  uint64_t areas = 0;
+  for (uint64_t i = 0; i < header.count; ++i) {
+    Record record{};
+    std::memcpy(&record, bytes.data() + header_size + i * record_size, record_size);
+    check(path, i, record.origin);
+    if (record.origin.source == LUMICUT_SOURCE_AREA) ++areas;
+    set.lights.push_back(record.light), set.origins.push_back(record.origin);
+  }
+  if (header.version == 1) return set;
+  if (header.emitter_samples < areas)
+    throw FileError(path,
+                    fmt::format("says {} samples of emitters, but {} lights are such", header.emitter_samples, areas));
+  set.light_paths = header.light_paths, set.emitter_samples = header.emitter_samples;
+  return set;
+}
+
+// The peer's: a count and bare records of position, MINUS the normal, intensity.
+api::VplSet read_peers(const std::string& path, const std::string& bytes) {
+  uint64_t count = 0;
+  if (bytes.size() >= 8) std::memcpy(&count, bytes.data(), 8);
+  const uint64_t room = bytes.size() < 8 ? 0 : bytes.size() - 8;
+  if (bytes.size() < 8 || room % sizeof(PeerRecord) != 0 || room / sizeof(PeerRecord) != count)
+    throw FileError(
+        path,
+        fmt::format(
+            "is no VPL file: neither starts with LUMIVPL, nor do its {} bytes hold a count and as many records of 36",
+            bytes.size()));
+  api::VplSet set;
+  set.lights.resize(count), set.origins.resize(count);
+  for (uint64_t i = 0; i < count; ++i) {
+    PeerRecord record;
+    std::memcpy(&record, bytes.data() + 8 + i * sizeof(record), sizeof(record));
+    lumicut_vpl& light = set.lights[i];
+    light.kind = LUMICUT_VPL_ORIENTED;
+    for (int k = 0; k < 3; ++k) {
+      light.position[k] = record.position[k];
+      light.normal[k] = -record.minus_normal[k];
+      light.intensity[k] = record.intensity[k];
+    }
+  }
+  return set;
+}
+
+}  // namespace
+
+api::VplSet read_vpls(const std::string& path) {
+  const std::string bytes = read_whole_file(path, uint64_t{64} << 30);
+  const bool own = bytes.size() >= sizeof(kMagic) && std::memcmp(bytes.data(), kMagic, sizeof(kMagic)) == 0;
+  api::VplSet set = own ? read_own(path, bytes) : read_peers(path, bytes);
+  for (uint64_t i = 0; i < set.lights.size(); ++i) check(path, i, set.lights[i]);
+  return set;
+}
+
+void write_vpls(const std::string& path, const api::VplSet& set) {
   Header header{};
   std::memcpy(header.magic, kMagic, sizeof(kMagic));
   header.version = kVersion;
-  header.record_size = sizeof(lumicut_vpl);
-  header.count = count;
-  std::string bytes(sizeof(header) + count * sizeof(lumicut_vpl), '\0');
+  header.record_size = sizeof(Record);
+  header.count = set.lights.size();
+  header.light_paths = set.light_paths, header.emitter_samples = set.emitter_samples;
+  std::string bytes(sizeof(header) + set.lights.size() * sizeof(Record), '\0');
   std::memcpy(bytes.data(), &header, sizeof(header));
-  if (count > 0) std::memcpy(bytes.data() + sizeof(header), lights, count * sizeof(lumicut_vpl));
+  for (size_t i = 0; i < set.lights.size(); ++i) {
+    const Record record = {set.lights[i], set.origins.empty() ? lumicut_vpl_origin{} : set.origins[i]};
+    std::memcpy(bytes.data() + sizeof(header) + i * sizeof(record), &record, sizeof(record));
+  }
   write_whole_file(path, bytes);
 }
 

@@ -27,13 +27,11 @@ float profile_share(const Vpl& v, const LightProfile* profile, const Vec3f& dire
 
 // What a light's falloff needs beside the light.
 struct Falloff {
-  // Squared distance below which no light comes nearer; spheres need none.
-  float clamp2;
   // Of the lights' set; null: none of the lights has one.
   const LightProfiles* profiles = nullptr;
 
-  Falloff(float c) : clamp2(c) {}
-  Falloff(float c, const LightProfiles& p) : clamp2(c), profiles(&p) {}
+  Falloff() = default;
+  explicit Falloff(const LightProfiles& p) : profiles(&p) {}
   const LightProfile* profile(const Vpl& v) const { return profiles != nullptr ? profiles->find(v.profile) : nullptr; }
 
   // Share of a spot's intensity towards a unit direction.

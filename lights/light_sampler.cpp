@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "core/parallel.h"
-#include "lights/lamp_vpls.h"
+#include "lights/light_vpls.h"
 #include "lights/texture_integral.h"
 
 namespace lumicut {
@@ -22,14 +22,14 @@ double profile_solid_angle(const Vpl& spot) {
 
 }  // namespace
 
-Rgb lamp_radiance(const Light& light, float cosine) {
+Rgb light_radiance(const Light& light, float cosine) {
   if (!narrowed(light)) return light.value;
   const Vpl profile = spread_profile(light);
   return light.value * profile.intensity * (spot_falloff(profile, cosine) / cosine);
 }
 
-void LightSampler::add_lamps(std::vector<double>& weights, const Progress* progress) {
-  const double world_area = std::numbers::pi * scene_.radius() * scene_.radius();
+void LightSampler::add_lights(std::vector<double>& weights, const Progress* progress) {
+  const double world_area = std::numbers::pi * scene_.extent().radius() * scene_.extent().radius();
   // Those that a VPL each stands for first, then the environment, then those with extent.
   for (const bool extended : {false, true}) {
     if (extended) {
@@ -38,9 +38,9 @@ void LightSampler::add_lamps(std::vector<double>& weights, const Progress* progr
       environment_share_ = power;  // until the others' power is known
       extended_ = sampler_.size();
     }
-    const auto add = [&](Kind kind, uint32_t lamp, double power, bool extent) {
+    const auto add = [&](Kind kind, uint32_t light, double power, bool extent) {
       if (!(power > 0.0) || extent != extended) return;
-      sampler_.push_back({kind, lamp, 0, 0});
+      sampler_.push_back({kind, light, 0, 0});
       weights.push_back(power);
     };
     for (uint32_t i = 0; i < scene_.lights().size(); ++i) {
@@ -112,7 +112,7 @@ double LightSampler::environment_power(const Progress* progress) {
                    ? luminance(env.color) * texels_.total() * 2 * std::numbers::pi * std::numbers::pi / weights.size()
                    : 0.0;
   }
-  return std::numbers::pi * scene_.radius() * scene_.radius() * integral;
+  return std::numbers::pi * scene_.extent().radius() * scene_.extent().radius() * integral;
 }
 
 void LightSampler::add_triangles(std::vector<double>& weights, const Progress* progress) {
@@ -185,7 +185,7 @@ void LightSampler::add_triangles(std::vector<double>& weights, const Progress* p
 
 LightSampler::LightSampler(const Scene& scene, const Progress* progress) : scene_(scene) {
   std::vector<double> weights;
-  add_lamps(weights, progress);
+  add_lights(weights, progress);
   add_triangles(weights, progress);
   power_ = DiscreteDistribution(weights);
   const double with_extent = has_extended() ? power_.sum(extended_, sampler_.size()) : 0.0;
@@ -208,7 +208,9 @@ double LightSampler::mesh_density(const SurfaceHit& surface) const {
                                                      : luminance(material.emission));
 }
 
-double LightSampler::lamp_density(uint32_t lamp) const { return area_density(luminance(scene_.lights()[lamp].value)); }
+double LightSampler::light_density(uint32_t light) const {
+  return area_density(luminance(scene_.lights()[light].value));
+}
 
 double LightSampler::environment_density(const Vec3f& towards) const {
   if (!has_environment()) return 0.0;

@@ -1,8 +1,10 @@
 // All that emits in a scene, as one distribution: chosen by power, sampled in position and direction. [Keller 1997]
 #pragma once
 
+#include <optional>
 #include <vector>
 
+#include "core/aabb.h"
 #include "core/progress.h"
 #include "core/rng.h"
 #include "lights/discrete_distribution.h"
@@ -21,13 +23,26 @@ struct EmittedRay {
 // A virtual light that stands for emitters that are not points.
 struct DirectSample {
   Vpl vpl;
-  bool seen_by_rays = false;  // paths may find it too: a mesh, the environment, a rectangle or disk [lamp_surfaces.h]
+  bool seen_by_rays = false;  // paths may find it too: a mesh, the environment, a rectangle or disk [light_surfaces.h]
   bool on_mesh = false;
+  float offset = 0.0f;   // how far shadow rays end before its surface
   double density = 0.0;  // of what rays find: for each unit of area, or for each steradian of the environment
 };
 
+// Form of an emitter with extent.
+struct EmitterShape {
+  enum class Kind : uint8_t { triangle, rectangle, disk, sphere } kind;
+  Vec3f corner;  // sphere: its centre
+  Vec3f u, v;    // edges from there; a disk is the ellipse within their parallelogram
+  Vec3f normal;  // unit, the side that emits; sphere: none
+  float area;
+  float radius = 0;  // sphere
+  bool both_sides = false;
+  Aabb bounds() const;
+};
+
 // Radiance of a rectangle or disk at the cosine to its axis, above 0.
-Rgb lamp_radiance(const Light& light, float cosine);
+Rgb light_radiance(const Light& light, float cosine);
 
 class LightSampler {
  public:
@@ -39,6 +54,17 @@ class LightSampler {
   const std::vector<Vpl>& delta_lights() const { return delta_; }
   // True where some emitter beside the environment has extent, and so needs many VPLs for its direct light.
   bool has_extended() const { return extended_ < sampler_.size(); }
+  // Those emitters by number; what they are, empty for suns; and how large a part of the surface (m², one side) each of
+  // `count` VPLs stands for.
+  size_t extended_count() const { return sampler_.size() - extended_; }
+  std::optional<EmitterShape> shape(size_t i) const;
+  double cell(size_t i, uint64_t count) const;
+  // The place `at` on its surface as a virtual light, seen from `from`, that stands for the area `area`; ends of shadow
+  // rays stand off it by `offset`.
+  Vpl place_on(size_t i, const Vec3f& at, const Vec3f& from, float area, float& offset) const;
+  // Their numbers: of a light, of a triangle in an instance of its mesh. Empty where it is none.
+  std::optional<size_t> emitter_of_light(uint32_t light) const;
+  std::optional<size_t> emitter_of_triangle(uint32_t mesh, uint32_t triangle, uint32_t instance) const;
   // One of `count` VPLs that stand for these emitters' direct light; `u` in [0,1) chooses the emitter by power.
   Vpl sample_direct(double u, uint64_t count, Rng& rng) const;
   // True where some mesh emits.
@@ -52,12 +78,10 @@ class LightSampler {
   EmittedRay sample_ray(Rng& rng) const;
   // One VPL that stands for the direct light of environment and extended emitters, where there are any.
   DirectSample sample_light(Rng& rng) const;
-  // A light of the scene (no sun) as one virtual light: a sample of where it emits, exact where it has no extent.
-  Vpl sample_lamp(uint32_t lamp, Rng& rng) const;
   // Density with which sample_light draws a place on an emissive mesh, on a rectangle or disk, for each unit of area, and
   // a direction towards the environment, for each steradian.
   double mesh_density(const SurfaceHit& surface) const;
-  double lamp_density(uint32_t lamp) const;
+  double light_density(uint32_t light) const;
   double environment_density(const Vec3f& towards) const;
   // Emitted by all, W of luminance.
   double power() const { return power_.total(); }
@@ -75,14 +99,20 @@ class LightSampler {
     Vec3f position, normal;
     Rgb radiance;
     float area_pdf;
+    float offset;  // of rays from there
   };
 
-  void add_lamps(std::vector<double>& weights, const Progress* progress);
+  void add_lights(std::vector<double>& weights, const Progress* progress);
   double environment_power(const Progress* progress);
   void add_triangles(std::vector<double>& weights, const Progress* progress);
   Surface sample_surface(const Emitter& e, Rng& rng) const;
   // A sample of an emitter with extent as a virtual light that stands for `weight` of it; a sun's has no area_pdf: 0.
-  Vpl extended_light(const Emitter& e, float weight, Rng& rng, float& area_pdf) const;
+  struct ExtendedSample {
+    Vpl vpl;
+    float area_pdf, offset;
+  };
+  static void spread(const Light& light, Vpl& v);
+  ExtendedSample extended_light(const Emitter& e, float weight, Rng& rng) const;
   // Of sample_light: density of a place whose emission has this luminance on average.
   double area_density(double emission) const;
   // Direction towards the environment, its radiance and density per steradian, from u and v in [0,1).
@@ -90,7 +120,7 @@ class LightSampler {
   // Direction in which light of a sun travels.
   Vec3f sample_sun(const Light& light, Rng& rng) const;
   EmittedRay distant_ray(const Vec3f& travel, const Rgb& irradiance, Rng& rng) const;
-  Vec3f offset(const Surface& s) const { return s.position + s.normal * scene_.epsilon(); }
+  Vec3f offset(const Surface& s) const { return s.position + s.normal * s.offset; }
 
   const Scene& scene_;
   // Those without extent, the environment, and from extended_ on those that need VPLs: one distribution of them all.

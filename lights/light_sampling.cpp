@@ -1,8 +1,8 @@
 // Draws virtual lights and rays from the emitters that light_sampler.cpp has gathered.
 #include <numbers>
 
-#include "lights/lamp_vpls.h"
 #include "lights/light_sampler.h"
+#include "lights/light_vpls.h"
 
 namespace lumicut {
 
@@ -65,21 +65,22 @@ LightSampler::Surface LightSampler::sample_surface(const Emitter& e, Rng& rng) c
     }
     Rgb radiance = scene_.emitted(surface, surface.geometric_normal);
     if (material.cutout()) radiance *= scene_.opacity(e.index, e.triangle, hit.hit.u, hit.hit.v);  // as rays meet it
-    return {surface.position, surface.geometric_normal, radiance, area_pdf};
+    return {surface.position, surface.geometric_normal, radiance, area_pdf, surface.offset};
   }
   const Light& l = scene_.lights()[e.index];
+  const float offset = scene_.offset_at(l.position);
   if (e.kind == Kind::sphere) {
     const Vec3f n = uniform_sphere(u, v);
     const float r2 = l.radius * l.radius;
-    return {l.position + n * l.radius, n, l.value / (kPi * r2), 1.0f / (4.0f * kPi * r2)};
+    return {l.position + n * l.radius, n, l.value / (kPi * r2), 1.0f / (4.0f * kPi * r2), offset};
   }
   const Vec3f n = cross(l.u, l.v);
   const float parallelogram = length(n);
   if (e.kind == Kind::rectangle)
-    return {l.position + l.u * (u - 0.5f) + l.v * (v - 0.5f), n / parallelogram, l.value, 1.0f / parallelogram};
+    return {l.position + l.u * (u - 0.5f) + l.v * (v - 0.5f), n / parallelogram, l.value, 1.0f / parallelogram, offset};
   const float r = 0.5f * std::sqrt(u), phi = 2.0f * kPi * v;
   return {l.position + l.u * (r * std::cos(phi)) + l.v * (r * std::sin(phi)), n / parallelogram, l.value,
-          4.0f / (kPi * parallelogram)};
+          4.0f / (kPi * parallelogram), offset};
 }
 
 Vec3f LightSampler::sample_environment(double u, double v, Rgb& radiance, float& pdf) const {
@@ -140,28 +141,32 @@ Vpl LightSampler::sample_direct(double u, uint64_t count, Rng& rng) const {
   const Emitter& e = sampler_[i];
   const auto weight =
       static_cast<float>(power_.sum(extended_, sampler_.size()) / (power_.sum(i, i + 1) * static_cast<double>(count)));
-  float area_pdf;
-  return extended_light(e, weight, rng, area_pdf);
+  ExtendedSample s = extended_light(e, weight, rng);
+  s.vpl.offset = s.offset;
+  if (s.area_pdf > 0.0f) s.vpl.cell = weight / s.area_pdf;
+  return s.vpl;
 }
 
-Vpl LightSampler::extended_light(const Emitter& e, float weight, Rng& rng, float& area_pdf) const {
+// Light of a rectangle or disk whose spread is narrowed.
+void LightSampler::spread(const Light& light, Vpl& v) {
+  if (!narrowed(light)) return;
+  const Vpl profile = spread_profile(light);
+  v.kind = VplKind::spot, v.spot_cosine = profile.spot_cosine, v.spread_tan = profile.spread_tan;
+  v.intensity = v.intensity * profile.intensity;
+}
+
+LightSampler::ExtendedSample LightSampler::extended_light(const Emitter& e, float weight, Rng& rng) const {
   if (e.kind == Kind::sun) {
     const Light& l = scene_.lights()[e.index];
     Vpl v;
     v.kind = VplKind::directional, v.normal = sample_sun(l, rng), v.intensity = l.value * weight, v.group = l.group;
-    area_pdf = 0.0f;
-    return v;
+    return {v, 0.0f, 0.0f};
   }
   const Surface s = sample_surface(e, rng);
-  area_pdf = s.area_pdf;
   const uint32_t group = e.kind == Kind::triangle ? scene_.meshes()[e.index].group : scene_.lights()[e.index].group;
   Vpl v = oriented(s.position, s.normal, s.radiance * (weight / s.area_pdf), group);
-  if (e.kind != Kind::triangle && narrowed(scene_.lights()[e.index])) {
-    const Vpl profile = spread_profile(scene_.lights()[e.index]);
-    v.kind = VplKind::spot, v.spot_cosine = profile.spot_cosine, v.spread_tan = profile.spread_tan;
-    v.intensity = v.intensity * profile.intensity;
-  }
-  return v;
+  if (e.kind != Kind::triangle) spread(scene_.lights()[e.index], v);
+  return {v, s.area_pdf, s.offset};
 }
 
 DirectSample LightSampler::sample_light(Rng& rng) const {
@@ -185,38 +190,35 @@ DirectSample LightSampler::sample_light(Rng& rng) const {
   const Emitter& e = sampler_[i];
   const double share = (1.0 - environment_share_) * power_.sum(i, i + 1) / power_.sum(extended_, sampler_.size());
   const auto weight = static_cast<float>(1.0 / share);
-  float area_pdf;
-  s.vpl = extended_light(e, weight, rng, area_pdf);
+  const ExtendedSample extended = extended_light(e, weight, rng);
+  s.vpl = extended.vpl, s.offset = extended.offset;
   s.on_mesh = e.kind == Kind::triangle;
-  s.seen_by_rays = e.kind != Kind::sphere && e.kind != Kind::sun, s.density = share * area_pdf;
+  s.seen_by_rays = e.kind != Kind::sphere && e.kind != Kind::sun, s.density = share * extended.area_pdf;
   return s;
 }
 
-Vpl LightSampler::sample_lamp(uint32_t lamp, Rng& rng) const {
-  const Light& l = scene_.lights()[lamp];
-  if (l.type == LightType::spot) return spot_of(l);
-  if (l.type == LightType::point) {
-    if (const LightProfile* profile = l.profile != 0 ? scene_.profiles().find(l.profile) : nullptr)
-      return profiled(l, *profile);
-    if (!(l.radius > 0.0f)) {
-      Vpl v;
-      v.position = l.position, v.intensity = l.value, v.group = l.group;
-      return v;
-    }
-  }
-  const Kind kind =
-      l.type == LightType::point ? Kind::sphere : (l.type == LightType::disk ? Kind::disk : Kind::rectangle);
-  float area_pdf;
-  return extended_light({kind, lamp, 0, 0}, 1.0f, rng, area_pdf);
-}
-
+// Aimed at the sphere of one part of the scene, chosen by its share: a density of rays for each unit of area across
+// them, whatever part they came from. Far grounds and domes get their share, and no more.
 EmittedRay LightSampler::distant_ray(const Vec3f& travel, const Rgb& irradiance, Rng& rng) const {
-  const float r = scene_.radius() * std::sqrt(rng.next_float()), phi = 2.0f * kPi * rng.next_float();
+  const auto parts = scene_.extent().parts();
+  if (parts.empty()) return {};
+  float choice = rng.next_float();
+  size_t chosen = 0;
+  while (chosen + 1 < parts.size() && choice >= parts[chosen].share) choice -= parts[chosen++].share;
+  const float r = parts[chosen].radius * std::sqrt(rng.next_float()), phi = 2.0f * kPi * rng.next_float();
   const Frame f(travel);
-  const Vec3f center = scene_.bounds().empty() ? Vec3f{} : scene_.bounds().center();
-  const Vec3f origin =
-      center - travel * (2.0f * scene_.radius()) + f.t * (r * std::cos(phi)) + f.b * (r * std::sin(phi));
-  return {origin, travel, irradiance * (kPi * scene_.radius() * scene_.radius()), 0};
+  const Vec3f through = parts[chosen].center + f.t * (r * std::cos(phi)) + f.b * (r * std::sin(phi));
+  double density = 0.0;
+  float behind = 0.0f;
+  for (const SceneExtent::Part& part : parts) {
+    const Vec3f to_center = part.center - through;
+    const float along = dot(to_center, travel), r2 = part.radius * part.radius;
+    behind = std::max(behind, part.radius - along);
+    // Its own part counts whatever rounding says.
+    if (&part == &parts[chosen] || length2(to_center - travel * along) <= r2)
+      density += static_cast<double>(part.share) / (std::numbers::pi * static_cast<double>(r2));
+  }
+  return {through - travel * behind, travel, irradiance * static_cast<float>(1.0 / density), 0};
 }
 
 EmittedRay LightSampler::sample_ray(Rng& rng) const {

@@ -12,13 +12,13 @@ LightSurfaces::LightSurfaces(const Scene& scene) : scene_(scene) {
     const Light& l = scene.lights()[i];
     if (!has(l) || !(max_component(l.value) > 0.0f) || !(area(l) > 0.0f)) continue;
     const auto base = static_cast<uint32_t>(positions_.size());
-    lamps_.push_back(i);
+    lights_.push_back(i);
     disks = disks || l.type == LightType::disk;
     for (const auto& [a, b] : {Vec2f{-0.5f, -0.5f}, Vec2f{0.5f, -0.5f}, Vec2f{0.5f, 0.5f}, Vec2f{-0.5f, 0.5f}})
       positions_.push_back(l.position + l.u * a + l.v * b);
     indices_.insert(indices_.end(), {base, base + 1, base + 2, base, base + 2, base + 3});
   }
-  if (lamps_.empty()) return;
+  if (lights_.empty()) return;
   AccelGeometry geometry;
   geometry.filter = this;
   geometry.meshes.push_back(
@@ -32,7 +32,7 @@ float LightSurfaces::area(const Light& light) {
 
 // The corners of a disk's parallelogram let rays through.
 bool LightSurfaces::passes(uint32_t, uint32_t prim, float u, float v) const {
-  if (scene_.lights()[lamps_[prim / 2]].type != LightType::disk) return false;
+  if (scene_.lights()[lights_[prim / 2]].type != LightType::disk) return false;
   // From the corner (-1/2, -1/2) to its two followers.
   const float x = prim % 2 == 0 ? u + v : u, y = prim % 2 == 0 ? v : u + v;
   return (x - 0.5f) * (x - 0.5f) + (y - 0.5f) * (y - 0.5f) > 0.25f;
@@ -43,13 +43,13 @@ bool LightSurfaces::next(const Vec3f& origin, const Vec3f& direction, float& nea
   ray.ray.org = origin, ray.ray.dir = direction, ray.ray.tnear = near, ray.ray.tfar = far;
   accel_->intersect({&ray, 1});
   if (ray.hit.geom == kNoId) return false;
-  hit.lamp = lamps_[ray.hit.prim / 2];
+  hit.light = lights_[ray.hit.prim / 2];
   hit.t = ray.ray.tfar;
   near = hit.t * (1.0f + 1e-5f) + 1e-12f;
-  const Light& light = scene_.lights()[hit.lamp];
+  const Light& light = scene_.lights()[hit.light];
   hit.area = area(light);
   hit.cosine = -dot(normalize(cross(light.u, light.v)), direction);
-  hit.radiance = hit.cosine > 0.0f ? lamp_radiance(light, hit.cosine) : Rgb{};
+  hit.radiance = hit.cosine > 0.0f ? light_radiance(light, hit.cosine) : Rgb{};
   return true;
 }
 

@@ -1,6 +1,5 @@
 // Radii of virtual spherical lights from how densely they lie. [Hašan et al. 2009, sec. 4: the tenth nearest light]
-// Departs: held between shares of the scene's radius, so that lights in one place keep a size and lonely ones do not
-// shine through the whole scene.
+// Departs: not below a share of the scene's typical radius, so that lights in one place keep a size.
 #pragma once
 
 #include <span>
@@ -10,11 +9,10 @@
 
 namespace lumicut {
 
-inline constexpr size_t kSphereNeighbour = 10;
-inline constexpr float kLeastSphere = 1e-3f, kLargestSphere = 0.1f;  // of the scene's radius, before `scale`
+inline constexpr float kLeastSphere = 1e-3f, kLonelySphere = 0.1f;  // of SceneExtent::radius, before `scale`
 
-// Oriented lights become spheres of `scale` times the distance to their tenth neighbour among `lights`; where there are
-// not so many, of the largest radius.
-void make_spheres(std::span<Vpl> lights, float scale, float scene_radius, const Progress* progress = nullptr);
+// Oriented lights become spheres of `scale` times the distance to their tenth neighbour among `lights`
+// [lights/light_spacing.h]; a lone one that of lonely ones.
+void make_spheres(std::span<Vpl> lights, float scale, float typical_radius, const Progress* progress = nullptr);
 
 }  // namespace lumicut

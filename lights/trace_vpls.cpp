@@ -51,6 +51,7 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
       const SurfaceInteraction at = scene.interaction(rays[i]);
       Vpl light;
       light.position = at.position, light.kind = VplKind::oriented, light.normal = at.bsdf.normal();
+      light.offset = at.offset;
       light.group = path.group;
       light.intensity = at.bsdf.lambertian_intensity(path.flux);
       if (max_component(light.intensity) > 0.0f && is_finite(light.intensity)) vpls.push_back({ids[i], light});
@@ -69,55 +70,66 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
   return vpls;
 }
 
+// Lights of paths [first, last), in the order of paths.
+std::vector<PathVpl> trace_in_chunks(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
+                                     uint64_t first, uint64_t last, Progress& progress) {
+  const size_t chunks = (last - first + kPathsPerChunk - 1) / kPathsPerChunk;
+  std::vector<std::vector<PathVpl>> parts(chunks);
+  tbb::parallel_for(size_t{0}, chunks, [&](size_t c) {
+    if (progress.cancelled()) return;
+    parts[c] = trace_paths(scene, emitters, options, first + c * kPathsPerChunk,
+                           std::min(last, first + (c + 1) * kPathsPerChunk));
+    progress.advance(parts[c].size());
+  });
+  progress.check();
+  std::vector<PathVpl> all;
+  for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+// As many paths as should give the wanted number, by the mean of others whose lights are not kept. Ending at the path that
+// fills the budget would favour long ones: by their spread over the number of paths, up to some percent of all light.
+uint64_t paths_for(const Scene& scene, const LightSampler& emitters, const VplOptions& options, uint64_t wanted,
+                   Progress& progress) {
+  constexpr uint64_t kFirstTrial = uint64_t{1} << 62;
+  const uint64_t trials = std::clamp<uint64_t>(wanted / 16, 1024, 4096), most = std::max<uint64_t>(wanted * 16, 65536);
+  const size_t found = trace_in_chunks(scene, emitters, options, kFirstTrial, kFirstTrial + trials, progress).size();
+  if (found == 0) return most;
+  return std::clamp<uint64_t>(
+      static_cast<uint64_t>(std::llround(static_cast<double>(wanted * trials) / static_cast<double>(found))), 1, most);
+}
+
 void trace_indirect(const Scene& scene, const LightSampler& emitters, const VplOptions& options, uint64_t wanted,
                     Progress& progress, VplSet& set) {
-  // Rounds whose size depends on counts alone, never on threads; the last path kept is the one that fills the budget.
-  const uint64_t most_paths = std::max<uint64_t>(wanted * 16, 65536);
-  std::vector<PathVpl> vpls;
-  uint64_t paths = 0;
-  while (vpls.size() < wanted && paths < most_paths) {
-    progress.check();
-    const uint64_t missing = wanted - vpls.size();
-    const double per_path =
-        vpls.empty() ? 1.0 : std::max(0.05, static_cast<double>(vpls.size()) / static_cast<double>(paths));
-    const uint64_t round = std::min(
-        most_paths - paths,
-        std::max<uint64_t>(kPathsPerChunk, static_cast<uint64_t>(static_cast<double>(missing) / per_path) + 1));
-    const size_t chunks = (round + kPathsPerChunk - 1) / kPathsPerChunk;
-    std::vector<std::vector<PathVpl>> parts(chunks);
-    tbb::parallel_for(size_t{0}, chunks, [&](size_t c) {
-      if (progress.cancelled()) return;
-      parts[c] = trace_paths(scene, emitters, options, paths + c * kPathsPerChunk,
-                             paths + std::min<uint64_t>(round, (c + 1) * kPathsPerChunk));
-      progress.advance(parts[c].size());
-    });
-    progress.check();
-    for (const auto& part : parts) vpls.insert(vpls.end(), part.begin(), part.end());
-    paths += round;
-  }
-  if (vpls.size() > wanted) {
-    // Whole paths only; those after the last one kept were never started, as far as the estimate goes.
-    const uint64_t last = vpls[wanted - 1].path;
-    const auto end = std::find_if(vpls.begin() + static_cast<ptrdiff_t>(wanted), vpls.end(),
-                                  [&](const PathVpl& v) { return v.path != last; });
-    if (end != vpls.end()) paths = last + 1;
-    vpls.erase(end, vpls.end());
-  }
+  const uint64_t paths = paths_for(scene, emitters, options, wanted, progress);
   const float normalise = 1.0f / static_cast<float>(paths);
-  for (PathVpl& v : vpls) {
-    v.vpl.intensity = v.vpl.intensity * normalise;
+  for (const PathVpl& v : trace_in_chunks(scene, emitters, options, 0, paths, progress)) {
     set.lights.push_back(v.vpl);
+    set.lights.back().intensity *= normalise;
   }
   set.light_paths = paths;
+}
+
+// Of the triangle just below a place.
+float offset_on_surface(const Scene& scene, const Vec3f& position, const Vec3f& normal) {
+  constexpr float kNear = 1e-3f;  // of the typical radius: a host's lights may lie a little off
+  const float least = scene.offset_at(position), height = std::max(kNear * scene.extent().radius(), 8.0f * least);
+  RayHit ray;
+  ray.ray.org = position + normal * height, ray.ray.dir = -normal, ray.ray.tfar = 2.0f * height;
+  scene.accel().intersect({&ray, 1});
+  return ray.hit.geom == kNoId ? least : scene.surface(ray).offset;
 }
 
 }  // namespace
 
 VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progress) {
+  return trace_vpls(scene, LightSampler(scene, &progress), options, progress);
+}
+
+VplSet trace_vpls(const Scene& scene, const LightSampler& emitters, const VplOptions& options, Progress& progress) {
   progress.begin("light paths", options.count);
   VplSet set;
   set.profiles = scene.profiles();
-  const LightSampler emitters(scene, &progress);
   if (emitters.empty()) return set;
   set.lights = emitters.delta_lights();
   const uint64_t budget = options.count > set.lights.size() ? options.count - set.lights.size() : 0;
@@ -150,14 +162,16 @@ VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progr
                                            direct, rng);
       if (max_component(v.intensity) > 0.0f && is_finite(v.intensity)) set.lights.push_back(v);
     }
+    set.extended = direct;
     progress.advance(direct + environment);
   }
+  set.direct = set.lights.size();
   const uint64_t indirect = options.count > set.lights.size() ? options.count - set.lights.size() : 0;
   if (indirect > 0 && options.max_depth > 0 && !scene.bounds().empty()) {
     const size_t first = set.lights.size();
     trace_indirect(scene, emitters, options, indirect, progress, set);
     if (options.sphere_scale > 0.0f)
-      make_spheres(std::span(set.lights).subspan(first), options.sphere_scale, scene.radius(), &progress);
+      make_spheres(std::span(set.lights).subspan(first), options.sphere_scale, scene.extent().radius(), &progress);
     progress.check();
   }
   return set;
@@ -165,8 +179,14 @@ VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progr
 
 VplSet off_surfaces(const VplSet& set, const Scene& scene) {
   VplSet moved = set;
-  for (Vpl& v : moved.lights)
-    if (v.kind == VplKind::oriented || v.kind == VplKind::sphere) v.position += v.normal * scene.epsilon();
+  parallel_chunks(moved.lights.size(), 4096, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      Vpl& v = moved.lights[i];
+      if (v.kind != VplKind::oriented && v.kind != VplKind::sphere) continue;
+      if (!(v.offset > 0.0f)) v.offset = offset_on_surface(scene, v.position, v.normal);
+      v.position += v.normal * v.offset;
+    }
+  });
   return moved;
 }
 

@@ -9,8 +9,10 @@
 
 namespace lumicut {
 
+class LightSampler;
+
 struct VplOptions {
-  // Wanted lights in all; what comes is within a few percent.
+  // Wanted lights in all; what comes is within some percent.
   uint32_t count = 60000;
   // Of them on extended emitters, for their direct light (point, spot and sun lights take one each).
   float direct_share = 0.25f;
@@ -27,9 +29,11 @@ struct VplOptions {
 
 // Energy is normalised by the number of light paths. Deterministic. A scene without emitters gives no lights.
 VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progress);
+VplSet trace_vpls(const Scene& scene, const LightSampler& emitters, const VplOptions& options, Progress& progress);
 
-// The same lights with oriented ones and spheres moved off their surface by the scene's epsilon, so that shadow rays
-// can start there. Traced lights and a host's own lie on their surfaces.
+// The same lights with oriented ones and spheres moved off their surface by their offset, so that shadow rays can start
+// there. Traced lights and a host's own lie on their surfaces; those whose offset is not known have the one of the
+// triangle that they lie on. Throws Error(cancelled).
 VplSet off_surfaces(const VplSet& set, const Scene& scene);
 
 }  // namespace lumicut

@@ -13,7 +13,7 @@ namespace lumicut {
 enum class VplKind : uint32_t { omni = 0, oriented = 1, directional = 2, spot = 3, sphere = 4 };
 inline constexpr int kVplKinds = 5;
 
-// Layout of lumicut_vpl in lumicut.h (64 bytes). A sphere is an oriented light spread over a ball. [Hašan et al. 2009:
+// A sphere is an oriented light spread over a ball. [Hašan et al. 2009:
 // virtual spherical lights]
 struct Vpl {
   Vec3f position{};  // directional: unused
@@ -27,8 +27,12 @@ struct Vpl {
   // Spot: id of a LightProfile [scene/light_profile.h] in place of the falloff above; then blend_cosine, spot_cosine and
   // spread_tan are the unit vector where its horizontal angle 0 lies, and intensity is that of its largest value.
   uint32_t profile = 0;
+  // What a host may not know; found from where the light lies.
+  float offset = 0.0f;  // how far shadow rays that start at it stand off its surface
+  float cell = 0.0f;    // m² of surface that it stands for; 0: exactly its point, or distant
+  float clamp2 = 0.0f;  // squared distance below which no point comes nearer
   LUMICUT_FIELDS(Vpl, position, kind, normal, group, intensity, edge_or_radius, blend_cosine, spot_cosine, spread_tan,
-                 profile)
+                 profile, offset, cell, clamp2)
 
   // Spot: the cosine at which it has fallen to 0.
   float cos_outer() const { return edge_or_radius; }
@@ -38,13 +42,14 @@ struct Vpl {
   float& radius() { return edge_or_radius; }
   Vec3f tangent() const { return {blend_cosine, spot_cosine, spread_tan}; }
 };
-static_assert(sizeof(Vpl) == 64);
 
 struct VplSet {
   std::vector<Vpl> lights;
-  uint64_t light_paths = 0;  // that were started; 0 for a host's own lights
+  uint64_t light_paths = 0;  // that were started; 0 where nothing is known of the lights
+  uint64_t direct = 0;       // the first so many shine by themselves; likewise 0
+  uint64_t extended = 0;     // samples drawn on emitters with extent for those; some give no light
   LightProfiles profiles;    // those that lights name
-  LUMICUT_FIELDS(VplSet, lights, light_paths, profiles)
+  LUMICUT_FIELDS(VplSet, lights, light_paths, direct, extended, profiles)
 };
 
 }  // namespace lumicut

@@ -3,10 +3,11 @@
 
 #include "plugin/check.h"
 #include "plugin/descriptors.h"
+#include "plugin/extensions.h"
+#include "plugin/include/lumicut/lumicut_lights.h"
 #include "plugin/include/lumicut/lumicut_state.h"
 #include "plugin/objects.h"
 #include "plugin/render_job.h"
-#include "plugin/state.h"
 
 using namespace lumicut;
 
@@ -19,7 +20,9 @@ const char* lumicut_version(uint32_t* abi_major, uint32_t* abi_minor) {
 const char* lumicut_last_error() { return last_error(); }
 
 const void* lumicut_get_extension(const char* id) {
-  if (id != nullptr && std::strcmp(id, LUMICUT_STATE_EXTENSION) == 0) return state_extension();
+  if (id == nullptr) return nullptr;
+  if (std::strcmp(id, LUMICUT_LIGHTS_EXTENSION) == 0) return lights_extension();
+  if (std::strcmp(id, LUMICUT_STATE_EXTENSION) == 0) return state_extension();
   return nullptr;
 }
 

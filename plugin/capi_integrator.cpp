@@ -1,4 +1,4 @@
-// Level 3: integrators, their parameters, their lights, and shading of a host's points.
+// Level 3: integrators, their parameters, and shading of a host's points. Their lights: capi_lights.cpp.
 #include <map>
 
 #include "integrators/traits.h"
@@ -9,9 +9,6 @@
 
 using namespace lumicut;
 
-static_assert(offsetof(lumicut_vpl, normal) == offsetof(Vpl, normal) &&
-              offsetof(lumicut_vpl, intensity) == offsetof(Vpl, intensity) &&
-              offsetof(lumicut_vpl, spread_tan) == offsetof(Vpl, spread_tan));
 static_assert(sizeof(lumicut_point) == 64);
 
 namespace {
@@ -116,21 +113,6 @@ const char* lumicut_integrator_get(lumicut_integrator integrator, const char* na
   return text;
 }
 
-lumicut_result lumicut_integrator_set_lights(lumicut_integrator integrator, const lumicut_vpl* lights, uint64_t count) {
-  return guard([&] {
-    lumicut_integrator_t& i = object(integrator);
-    const AccessGuard::Hold hold = i.gate.change("lumicut_integrator_set_lights");
-    if (count == 0) {
-      i.host_lights.reset();
-      i.host_lights_id = 0;
-      return;
-    }
-    auto made = std::make_shared<const VplSet>(to_vpls(lights, count));
-    i.host_lights = std::move(made);
-    i.host_lights_id = ++i.host_lights_sets;
-  });
-}
-
 lumicut_result lumicut_integrator_prepare(lumicut_integrator integrator, lumicut_scene scene) {
   return guard([&] {
     lumicut_integrator_t& i = object(integrator);
@@ -141,18 +123,6 @@ lumicut_result lumicut_integrator_prepare(lumicut_integrator integrator, lumicut
     auto stats = std::make_unique<Stats>();
     run_work(i.work, [&](Progress& progress) { i.device->arena.run([&] { i.prepare_for(s, progress, *stats); }); });
     i.stats = std::move(stats);
-  });
-}
-
-lumicut_result lumicut_integrator_get_lights(lumicut_integrator integrator, const lumicut_vpl** lights,
-                                             uint64_t* count) {
-  return guard([&] {
-    lumicut_integrator_t& i = object(integrator);
-    if (lights == nullptr || count == nullptr) fail_argument("lumicut_integrator_get_lights: lights or count is NULL");
-    const AccessGuard::Hold hold = i.gate.read("lumicut_integrator_get_lights");
-    if (i.prepared == nullptr) fail_state("lumicut_integrator: it is not prepared");
-    *lights = reinterpret_cast<const lumicut_vpl*>(i.prepared->vpls->lights.data());
-    *count = i.prepared->vpls->lights.size();
   });
 }
 
@@ -183,6 +153,13 @@ lumicut_result lumicut_integrator_shade(lumicut_integrator integrator, const lum
         batch.finish();
         std::vector<Rgb> light(batch.size());
         p.method->shade(batch, light, {}, {*progress, *i.stats});
+        if (p.nearby != nullptr) {
+          TracedPoints hits;
+          Counters counters;
+          p.nearby->trace(batch, {1, false, true}, *progress, hits, counters);
+          for (size_t k = 0; k < hits.light.size(); ++k) light[hits.pixel[k]] += hits.light[k];
+          i.stats->add(counters);
+        }
         for (size_t k = 0; k < starts.size(); ++k) {
           const size_t end = k + 1 < starts.size() ? starts[k + 1] : light.size();
           Rgb sum = light[starts[k]];

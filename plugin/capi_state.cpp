@@ -1,13 +1,12 @@
 // Extension "lumicut.state/1": what an integrator prepared, as bytes. The format is in docs/integrators/wspd.md.
 #include <cstring>
-#include <limits>
 
 #include "lights/trace_vpls.h"
 #include "plugin/check.h"
 #include "plugin/convert.h"
+#include "plugin/extensions.h"
 #include "plugin/include/lumicut/lumicut_state.h"
 #include "plugin/objects.h"
-#include "plugin/state.h"
 #include "render/identity.h"
 
 using namespace lumicut;
@@ -16,19 +15,20 @@ namespace {
 
 constexpr char kMagic[8] = {'L', 'U', 'M', 'I', 'C', 'U', 'T', 'S'};
 constexpr char kIntegrator[] = "integrator";
-constexpr uint32_t kVersion = 3, kByteOrder = 0x01020304u;
+constexpr uint32_t kVersion = 4, kByteOrder = 0x01020304u;
+constexpr uint64_t kLightBytes = sizeof(lumicut_vpl) + sizeof(lumicut_vpl_origin);
 
-// Followed by what it was made for as text, the lights, and the method's own bytes.
+// Followed by what it was made for as text, the lights, their origins, and the method's own bytes.
 struct Header {
   char magic[8];
   uint32_t version, byte_order;
   uint64_t size;      // of all
   uint64_t checksum;  // of the header with 0 here, and of all that follows it
-  uint64_t lights, light_paths;
+  uint64_t lights, light_paths, emitter_samples;
   uint64_t method_bytes;
   uint32_t key_bytes, host_lights;
 };
-static_assert(sizeof(Header) == 64);
+static_assert(sizeof(Header) == 72);
 
 uint64_t checksum(Header h, const uint8_t* body, size_t size) {
   h.checksum = 0;
@@ -53,14 +53,15 @@ std::vector<uint8_t> save(lumicut_integrator_t& i) {
     fail_state("lumicut_integrator: its scene was changed since it was prepared");
   const std::vector<uint8_t> own = p.method->save_state();
   const std::string key = state_key(i, *p.params, s.scene);
+  const HostVpls lights = from_vpls(*p.vpls);
   Header h{};
   std::memcpy(h.magic, kMagic, sizeof(kMagic));
   h.version = kVersion, h.byte_order = kByteOrder;
-  h.lights = p.vpls->lights.size(), h.light_paths = p.vpls->light_paths;
+  h.lights = lights.lights.size(), h.light_paths = lights.light_paths, h.emitter_samples = lights.emitter_samples;
   h.method_bytes = own.size();
   h.key_bytes = static_cast<uint32_t>(key.size());
   h.host_lights = p.host_lights != 0 ? 1 : 0;
-  h.size = sizeof(Header) + key.size() + h.lights * sizeof(Vpl) + own.size();
+  h.size = sizeof(Header) + key.size() + h.lights * kLightBytes + own.size();
   std::vector<uint8_t> out(h.size);
   uint8_t* at = out.data() + sizeof(h);
   const auto append = [&](const void* data, size_t size) {
@@ -68,7 +69,8 @@ std::vector<uint8_t> save(lumicut_integrator_t& i) {
     at += size;
   };
   append(key.data(), key.size());
-  append(p.vpls->lights.data(), h.lights * sizeof(Vpl));
+  append(lights.lights.data(), h.lights * sizeof(lumicut_vpl));
+  append(lights.origins.data(), h.lights * sizeof(lumicut_vpl_origin));
   append(own.data(), own.size());
   h.checksum = checksum(h, out.data() + sizeof(h), out.size() - sizeof(h));
   std::memcpy(out.data(), &h, sizeof(h));
@@ -94,7 +96,7 @@ void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uin
     if (count > left / each) fail_bytes("its parts are longer than it is: damaged");
     left -= count * each;
   };
-  take(h.key_bytes, 1), take(h.lights, sizeof(Vpl)), take(h.method_bytes, 1);
+  take(h.key_bytes, 1), take(h.lights, kLightBytes), take(h.method_bytes, 1);
   const uint8_t* at = bytes + sizeof(h);
   if (left != 0 || checksum(h, at, size - sizeof(h)) != h.checksum) fail_bytes("its checksum is wrong: damaged");
 
@@ -107,16 +109,20 @@ void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uin
   }
   at += h.key_bytes;
   // Lights of a file are checked as those of a host are.
-  std::vector<lumicut_vpl> saved(h.lights);
-  if (h.lights > 0) std::memcpy(saved.data(), at, h.lights * sizeof(Vpl));
-  at += h.lights * sizeof(Vpl);
+  HostVpls saved;
+  const auto read = [&](auto& array) {
+    array.resize(h.lights);
+    if (h.lights > 0) std::memcpy(array.data(), at, h.lights * sizeof(array[0]));
+    at += h.lights * sizeof(array[0]);
+  };
+  read(saved.lights), read(saved.origins);
+  saved.light_paths = h.light_paths, saved.emitter_samples = h.emitter_samples;
   std::shared_ptr<VplSet> vpls;
   try {
-    vpls = std::make_shared<VplSet>(to_vpls(saved.data(), h.lights, s.scene.profiles()));
+    vpls = std::make_shared<VplSet>(to_vpls(saved.view(), s.scene.profiles()));
   } catch (const Error& error) {
     fail_bytes(std::string("a light in it makes no sense: ") + error.what());
   }
-  vpls->light_paths = h.light_paths;
 
   auto next = std::make_unique<Prepared>();
   next->scene = &s.scene;
@@ -126,8 +132,8 @@ void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uin
   next->vpls_key = tracing_key(vpl_options(i.params.common()));
   next->host_lights = h.host_lights != 0 ? i.host_lights_sets + 1 : 0;
   next->params = i.params;
-  next->standing_off = off_surfaces(*vpls, s.scene);
-  next->standing_off.profiles.prefer(s.scene.profiles());
+  next->vpls = vpls;
+  next->place_lights(i.entry.light_source, progress);
   next->method = i.entry.create();
   next->method->load_state(s.scene, next->standing_off, *next->params, {at, h.method_bytes}, {progress, stats});
   stats.set_value("vpls", static_cast<double>(vpls->lights.size()));
@@ -136,7 +142,6 @@ void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uin
   i.host_lights = h.host_lights != 0 ? std::shared_ptr<const VplSet>(vpls) : nullptr;
   i.host_lights_id = next->host_lights;
   if (h.host_lights != 0) ++i.host_lights_sets;
-  next->vpls = std::move(vpls);
   i.prepared = std::move(next);
 }
 

@@ -366,61 +366,124 @@ Camera to_camera(const lumicut_camera& in) {
   return camera;
 }
 
-VplSet to_vpls(const lumicut_vpl* lights, uint64_t count, const LightProfiles& known) {
-  static_assert(sizeof(lumicut_vpl) == sizeof(Vpl));
-  VplSet set;
-  if (count == 0) return set;
-  if (lights == nullptr) fail_argument("lumicut_vpls: NULL, but count is " + number_text(count));
-  if (count > 0xfffffffeu) fail_argument("lumicut_vpls: count " + number_text(count) + " is more than 4294967294");
-  set.lights.resize(count);
-  for (uint64_t i = 0; i < count; ++i) {
-    const lumicut_vpl& in = lights[i];
-    const FieldValidator c("lumicut_vpl", i);
-    c.integer("kind", in.kind, LUMICUT_VPL_OMNI, LUMICUT_VPL_SPHERE);
-    c.integer("group", in.group, 0, kMaxGroup);
-    c.not_negative("intensity", in.intensity);
-    if (in.profile != 0 && in.kind != LUMICUT_VPL_SPOT) c.fail("profile", "only spots have one");
-    if (in.profile != 0 && set.profiles.find(in.profile) == nullptr) {
-      const ProfileRef named = known.find(in.profile) != nullptr ? known.hold(in.profile) : named_profile(in.profile);
-      if (named == nullptr)
-        c.fail("profile", number_text(uint64_t{in.profile}) + " is no profile that a scene was given");
-      set.profiles.add(named);
-    }
-    Vpl& vpl = set.lights[i];
-    vpl.kind = static_cast<VplKind>(in.kind);
-    vpl.group = in.group;
-    vpl.intensity = vec(in.intensity);
-    if (vpl.kind != VplKind::directional) {
-      c.coordinate("position", in.position);
-      vpl.position = vec(in.position);
-    }
-    if (vpl.kind != VplKind::omni) {
-      c.finite("normal", in.normal);
-      const double l = length(vec_double(in.normal));
-      if (std::abs(l - 1.0) > 1e-2) c.fail("normal", "has length " + number_text(l) + ", not 1");
-      // Those that are unit as far as floats go stay as they are, so that a set goes out and in again unchanged.
-      vpl.normal = std::abs(l - 1.0) > 1e-6 ? vec(in.normal) * static_cast<float>(1.0 / l) : vec(in.normal);
-    }
-    if (in.profile != 0) {
-      c.range("cos_outer", in.cos_outer, -1.0f, 1.0f);
-      const float tangent[3] = {in.blend, in.spot_cosine, in.spread_tan};
-      c.finite("blend", tangent);
-      if (std::abs(length(vec_double(tangent)) - 1.0) > 1e-2 || std::abs(dot(vec(tangent), vpl.normal)) > 1e-2f)
-        c.fail("blend", "with spot_cosine and spread_tan is no unit vector orthogonal to the normal");
-      vpl.cos_outer() = in.cos_outer, vpl.profile = in.profile;
-      vpl.blend_cosine = in.blend, vpl.spot_cosine = in.spot_cosine, vpl.spread_tan = in.spread_tan;
-    } else if (vpl.kind == VplKind::sphere) {
-      c.range("cos_outer", in.cos_outer, std::numeric_limits<float>::min(), kLargestCoordinate);
-      vpl.radius() = in.cos_outer;
-    } else if (vpl.kind == VplKind::spot) {
-      c.range("cos_outer", in.cos_outer, -1.0f, 1.0f);
-      c.range("blend", in.blend, 0.0f, 2.0f);
-      c.range("spot_cosine", in.spot_cosine, 0.0f, 1.0f);
-      c.not_negative("spread_tan", in.spread_tan);
-      vpl.cos_outer() = in.cos_outer, vpl.blend_cosine = in.blend, vpl.spot_cosine = in.spot_cosine;
-      vpl.spread_tan = in.spread_tan;
-    }
+// A virtual light begins as the host's struct does.
+static_assert(offsetof(lumicut_vpl, normal) == offsetof(Vpl, normal) &&
+              offsetof(lumicut_vpl, intensity) == offsetof(Vpl, intensity) &&
+              offsetof(lumicut_vpl, spread_tan) == offsetof(Vpl, spread_tan) &&
+              offsetof(lumicut_vpl, profile) == offsetof(Vpl, profile) &&
+              sizeof(lumicut_vpl) == offsetof(Vpl, profile) + sizeof(uint32_t) && std::is_trivially_copyable_v<Vpl>);
+
+namespace {
+
+// Profiles that it names are added to `profiles`.
+Vpl to_vpl(const lumicut_vpl& in, uint64_t i, const LightProfiles& known, LightProfiles& profiles) {
+  const FieldValidator c("lumicut_vpl", i);
+  c.integer("kind", in.kind, LUMICUT_VPL_OMNI, LUMICUT_VPL_SPHERE);
+  c.integer("group", in.group, 0, kMaxGroup);
+  c.not_negative("intensity", in.intensity);
+  if (in.profile != 0 && in.kind != LUMICUT_VPL_SPOT) c.fail("profile", "only spots have one");
+  if (in.profile != 0 && profiles.find(in.profile) == nullptr) {
+    const ProfileRef named = known.find(in.profile) != nullptr ? known.hold(in.profile) : named_profile(in.profile);
+    if (named == nullptr)
+      c.fail("profile", number_text(uint64_t{in.profile}) + " is no profile that a scene was given");
+    profiles.add(named);
   }
+  Vpl vpl;
+  vpl.kind = static_cast<VplKind>(in.kind);
+  vpl.group = in.group;
+  vpl.intensity = vec(in.intensity);
+  if (vpl.kind != VplKind::directional) {
+    c.coordinate("position", in.position);
+    vpl.position = vec(in.position);
+  }
+  if (vpl.kind != VplKind::omni) {
+    c.finite("normal", in.normal);
+    const double l = length(vec_double(in.normal));
+    if (std::abs(l - 1.0) > 1e-2) c.fail("normal", "has length " + number_text(l) + ", not 1");
+    // Those that are unit as far as floats go stay as they are, so that a set goes out and in again unchanged.
+    vpl.normal = std::abs(l - 1.0) > 1e-6 ? vec(in.normal) * static_cast<float>(1.0 / l) : vec(in.normal);
+  }
+  if (in.profile != 0) {
+    c.range("cos_outer", in.cos_outer, -1.0f, 1.0f);
+    const float tangent[3] = {in.blend, in.spot_cosine, in.spread_tan};
+    c.finite("blend", tangent);
+    if (std::abs(length(vec_double(tangent)) - 1.0) > 1e-2 || std::abs(dot(vec(tangent), vpl.normal)) > 1e-2f)
+      c.fail("blend", "with spot_cosine and spread_tan is no unit vector orthogonal to the normal");
+    vpl.cos_outer() = in.cos_outer, vpl.profile = in.profile;
+    vpl.blend_cosine = in.blend, vpl.spot_cosine = in.spot_cosine, vpl.spread_tan = in.spread_tan;
+  } else if (vpl.kind == VplKind::sphere) {
+    c.range("cos_outer", in.cos_outer, std::numeric_limits<float>::min(), kLargestCoordinate);
+    vpl.radius() = in.cos_outer;
+  } else if (vpl.kind == VplKind::spot) {
+    c.range("cos_outer", in.cos_outer, -1.0f, 1.0f);
+    c.range("blend", in.blend, 0.0f, 2.0f);
+    c.range("spot_cosine", in.spot_cosine, 0.0f, 1.0f);
+    c.not_negative("spread_tan", in.spread_tan);
+    vpl.cos_outer() = in.cos_outer, vpl.blend_cosine = in.blend, vpl.spot_cosine = in.spot_cosine;
+    vpl.spread_tan = in.spread_tan;
+  }
+  return vpl;
+}
+
+void take_origin(const lumicut_vpl_origin& in, uint64_t i, Vpl& vpl) {
+  const FieldValidator c("lumicut_vpl_origin", i);
+  c.integer("source", in.source, LUMICUT_SOURCE_PATH, LUMICUT_SOURCE_AREA);
+  c.range("offset", in.offset, 0.0f, kLargestCoordinate);
+  c.not_negative("area", in.area);
+  if (in.source == LUMICUT_SOURCE_AREA && !(in.area > 0.0f))
+    c.fail("area", "is 0, but the source is LUMICUT_SOURCE_AREA");
+  if (in.source != LUMICUT_SOURCE_AREA && in.area > 0.0f)
+    c.fail("area", number_text(in.area) + " is not 0, but the source is not LUMICUT_SOURCE_AREA");
+  vpl.offset = in.offset, vpl.cell = in.area;
+}
+
+}  // namespace
+
+lumicut_vpl_set HostVpls::view() const {
+  return {sizeof(lumicut_vpl_set), 0, lights.size(), lights.data(), origins.data(), light_paths, emitter_samples};
+}
+
+HostVpls from_vpls(const VplSet& set) {
+  HostVpls out;
+  out.lights.resize(set.lights.size());
+  out.origins.resize(set.lights.size());
+  for (size_t i = 0; i < set.lights.size(); ++i) {
+    const Vpl& v = set.lights[i];
+    std::memcpy(&out.lights[i], &v, sizeof(lumicut_vpl));
+    const bool area = v.cell > 0.0f;
+    out.origins[i].source = i >= set.direct ? LUMICUT_SOURCE_PATH : area ? LUMICUT_SOURCE_AREA : LUMICUT_SOURCE_POINT;
+    out.origins[i].offset = v.offset, out.origins[i].area = v.cell;
+  }
+  out.light_paths = set.light_paths, out.emitter_samples = set.extended;
+  return out;
+}
+
+VplSet to_vpls(const lumicut_vpl_set& in, const LightProfiles& known) {
+  const FieldValidator c("lumicut_vpl_set");
+  if (in.reserved != 0) c.fail_unknown("reserved", number_text(uint64_t{in.reserved}) + " is not 0");
+  VplSet set;
+  if (in.count > 0 && in.lights == nullptr) fail_argument("lumicut_vpls: NULL, but count is " + number_text(in.count));
+  if (in.count > 0xfffffffeu)
+    fail_argument("lumicut_vpls: count " + number_text(in.count) + " is more than 4294967294");
+  const auto direct = [&](uint64_t i) { return in.origins != nullptr && in.origins[i].source != LUMICUT_SOURCE_PATH; };
+  uint64_t areas = 0;
+  set.lights.reserve(in.count);
+  for (const bool first : {true, false}) {
+    for (uint64_t i = 0; i < in.count; ++i) {
+      if (direct(i) != first) continue;
+      set.lights.push_back(to_vpl(in.lights[i], i, known, set.profiles));
+      if (in.origins == nullptr) continue;
+      take_origin(in.origins[i], i, set.lights.back());
+      if (in.origins[i].source == LUMICUT_SOURCE_AREA) ++areas;
+    }
+    if (first) set.direct = set.lights.size();
+  }
+  if (in.count > 0 && in.origins == nullptr && in.emitter_samples != 0)
+    c.fail("emitter_samples", "is " + number_text(in.emitter_samples) + ", but origins is NULL");
+  if (in.emitter_samples < areas)
+    c.fail("emitter_samples", number_text(in.emitter_samples) + " is less than the " + number_text(areas) +
+                                  " lights of LUMICUT_SOURCE_AREA");
+  set.light_paths = in.light_paths, set.extended = in.emitter_samples;
   return set;
 }
 
@@ -460,8 +523,8 @@ std::vector<uint64_t> append_points(const Scene& scene, const lumicut_point* poi
     const Vec3f position = vec(p.position), geometric = normalize(vec(p.geometric_normal)),
                 normal = normalize(vec(p.normal)), to_viewer = normalize(vec(p.to_viewer));
     if (scene.coated()) starts.push_back(out.size());
-    const Bsdf bsdf =
-        scene.bsdf({position, geometric, normal, to_viewer, scene.epsilon(), p.pixel}, p.material, {p.u, p.v});
+    const Bsdf bsdf = scene.bsdf({position, geometric, normal, to_viewer, scene.offset_at(position), p.pixel},
+                                 p.material, {p.u, p.v});
     for (const SurfacePoint& point : bsdf.layers()) out.push(point);
   }
   return starts;

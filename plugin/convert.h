@@ -7,6 +7,7 @@
 #include "film/film.h"
 #include "lights/vpl.h"
 #include "plugin/boundary.h"
+#include "plugin/include/lumicut/lumicut_lights.h"
 #include "render/frame.h"
 #include "render/iterations.h"
 #include "scene/scene.h"
@@ -29,9 +30,18 @@ std::vector<Vec3f> to_positions(const float* xyz, uint64_t count, const char* ow
 std::vector<Vec3f> to_normals(const float* xyz, uint64_t count);  // unchecked: the scene mends broken ones
 std::vector<Transform> to_transforms(const float* m, uint64_t count, const char* owner);
 
-// A host's lights. Normals within 1 % of unit length are made unit. Profiles that they name are looked for in `known`
-// first, then among all of the process.
-VplSet to_vpls(const lumicut_vpl* lights, uint64_t count, const LightProfiles& known = {});
+// A host's lights, those of emitters first. Normals within 1 % of unit length are made unit. Profiles that they name are
+// looked for in `known` first, then among all of the process.
+VplSet to_vpls(const lumicut_vpl_set& in, const LightProfiles& known = {});
+
+// The same the other way.
+struct HostVpls {
+  std::vector<lumicut_vpl> lights;
+  std::vector<lumicut_vpl_origin> origins;
+  uint64_t light_paths = 0, emitter_samples = 0;
+  lumicut_vpl_set view() const;
+};
+HostVpls from_vpls(const VplSet& set);
 
 // Points [first, last) of a host, checked against the scene's materials and appended to `out`, where a clear coat's
 // lobe follows its point. Where the scene has any: the place of each point in `out`; else empty.

@@ -126,3 +126,12 @@ void lumicut_integrator_t::prepare_for(lumicut_scene_t& of, Progress& progress, 
 lumicut_scene_t& lumicut_integrator_t::prepared_scene() const {
   return **static_cast<const Ref<lumicut_scene_t>*>(prepared->scene_owner.get());
 }
+
+const HostVpls& lumicut_integrator_t::prepared_lights() {
+  const std::lock_guard lock(shown_mutex);
+  if (shown_of != prepared->vpls) {
+    shown = from_vpls(*prepared->vpls);
+    shown_of = prepared->vpls;
+  }
+  return shown;
+}

@@ -110,9 +110,14 @@ struct lumicut_integrator_t : lumicut::ObjectOf<lumicut_integrator_t>, lumicut::
   void prepare_for(lumicut_scene_t& scene, lumicut::Progress& progress, lumicut::Stats& into);
   // The scene that `prepared` is of.
   lumicut_scene_t& prepared_scene() const;
+  // The lights of `prepared` as hosts see them, until it is prepared again. From many threads.
+  const lumicut::HostVpls& prepared_lights();
 
   lumicut::Ref<lumicut_device_t> device;
   lumicut::AccessGuard gate{lumicut::HandleKind::integrator};
+  std::mutex shown_mutex;
+  std::shared_ptr<const lumicut::VplSet> shown_of;  // what `shown` shows
+  lumicut::HostVpls shown;
   lumicut::Work work;
   std::unique_ptr<lumicut::Stats> stats = std::make_unique<lumicut::Stats>();
   std::string stats_text;

@@ -3,10 +3,9 @@
 // on another: virtual lights stand for what is reflected evenly, whatever the direction.
 #pragma once
 
-#include <memory>
-
 #include "core/stats.h"
 #include "lights/light_surfaces.h"
+#include "render/clamp.h"
 #include "render/nearby_lights.h"
 #include "render/specular_chain.h"
 #include "scene/scene.h"
@@ -15,25 +14,27 @@ namespace lumicut {
 
 class ClampCompensation {
  public:
-  // `distance`: that of the clamp, above 0. `spheres`: virtual lights on surfaces are, and lose nothing by it. Scene
-  // outlives this. Throws Error(cancelled).
-  ClampCompensation(const Scene& scene, float distance, bool spheres, uint64_t seed, const Progress& progress);
+  // `nearby`: samples what the clamp takes from emitters with extent; null: rays alone bring it. `spheres`: virtual lights
+  // on surfaces are, and lose nothing by it. All outlive this.
+  ClampCompensation(const Scene& scene, const Clamp& clamp, const NearbyLights* nearby, bool spheres, uint64_t seed);
 
-  // One ray from each point (unless it is cut short by chance, or the point is black), one sample of each near light,
-  // and one of all emissive meshes. `level` counts the surfaces since the camera. Deterministic: numbers belong to the places of points.
-  TracedPoints trace(const ShadePoints& points, uint32_t level, const Progress& progress, Counters& counters) const;
+  // One ray from each point (unless it is cut short by chance, or the point is black). `level` counts the surfaces since
+  // the camera. Appends to `hits`. Deterministic: numbers belong to the places of points. Throws Error(cancelled).
+  void trace(const ShadePoints& points, uint32_t level, const Progress& progress, TracedPoints& hits,
+             Counters& counters) const;
 
  private:
-  void nearby_lights(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, TracedPoints& hits) const;
-
-  void near_mesh(const SurfacePoint& point, Rng& rng, std::vector<Ray>& shadows, TracedPoints& hits) const;
+  struct Search;  // of one call
+  void find_lights(const Search& search, size_t ray, TracedPoints& hits) const;
+  void find_surface(Search& search, size_t ray, TracedPoints& hits) const;
+  // Share of what a ray finds at `position` that a virtual light there would lose.
+  float lost_at(const Search& search, const Vec3f& position, float distance) const;
 
   const Scene& scene_;
-  const float distance_;
+  const Clamp& clamp_;
+  const NearbyLights* const nearby_;
   const bool spheres_;
   const uint64_t seed_;
-  LightSampler sampler_;
-  NearbyLights lamps_;
   LightSurfaces light_surfaces_;
 };
 

@@ -45,10 +45,10 @@ struct PixelSums {
 
 class Batch {
  public:
-  // `lamps`: where anything of the scene may be specular.
+  // `surfaces`: where anything of the scene may be specular.
   Batch(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options,
-        const LightSurfaces* lamps)
-      : scene_(scene), methods_(methods), options_(options), lamps_(lamps) {}
+        const LightSurfaces* surfaces)
+      : scene_(scene), methods_(methods), options_(options), light_surfaces_(surfaces) {}
 
   void add_tile(const Rect& tile) {
     tiles_.push_back(tile);
@@ -69,7 +69,7 @@ class Batch {
     std::vector<SurfacePoint> found(pixels_.size() * samples);
     std::vector<uint8_t> hit(found.size(), 0);
     std::vector<std::optional<SurfacePoint>> coats(scene_.coated() ? found.size() : 0);
-    std::vector<std::optional<ChainRay>> chain(lamps_ != nullptr ? found.size() : 0);
+    std::vector<std::optional<ChainRay>> chain(light_surfaces_ != nullptr ? found.size() : 0);
     parallel_chunks(pixels_.size(), std::max<size_t>(1, 1024 / samples), [&](size_t begin, size_t end) {
       if (context.progress.cancelled()) return;
       std::vector<RayHit> rays((end - begin) * samples);
@@ -108,17 +108,17 @@ class Batch {
       if (ray) rays.push_back(*ray);
     if (rays.empty()) return;
     Counters counters;
-    follow_chains(scene_, *lamps_, std::move(rays), context.progress, seen_, counters);
+    follow_chains(scene_, *light_surfaces_, std::move(rays), context.progress, seen_, counters);
     context.stats.add(counters);
   }
 
   // The points of the camera, and those that rays from them find.
-  void shade(const ClampCompensation* compensation, ShadeContext context) {
+  void shade(const NearbyLights* nearby, const ClampCompensation* compensation, ShadeContext context) {
     light_.assign(methods_.size(), std::vector<Rgb>(pixels_.size()));
     counts_.assign(pixels_.size(), {});
-    shade_levels(points_, compensation, light_, context);
+    shade_levels(points_, nearby, compensation, light_, context);
     for (size_t i = 0; i < seen_.light.size(); ++i) light_[slot(seen_.group[i])][seen_.pixel[i]] += seen_.light[i];
-    if (!seen_.found.empty()) shade_levels(seen_.points(), compensation, light_, context);
+    if (!seen_.found.empty()) shade_levels(seen_.points(), nearby, compensation, light_, context);
     if (!options_.illuminance) return;
     // White Lambert surfaces show the irradiance over π.
     ShadePoints white;
@@ -132,7 +132,7 @@ class Batch {
     }
     white.finish();
     std::vector<std::vector<Rgb>> shown(methods_.size(), std::vector<Rgb>(pixels_.size()));
-    shade_levels(white, compensation, shown, context);
+    shade_levels(white, nearby, compensation, shown, context);
     illuminance_.assign(pixels_.size(), 0.0f);
     for (const auto& of_group : shown)
       for (size_t p = 0; p < pixels_.size(); ++p)
@@ -173,20 +173,22 @@ class Batch {
   // Chance ends chains long before.
   static constexpr uint32_t kMaxLevels = 64;
 
-  void shade_levels(const ShadePoints& first, const ClampCompensation* compensation,
+  void shade_levels(const ShadePoints& first, const NearbyLights* nearby, const ClampCompensation* compensation,
                     std::vector<std::vector<Rgb>>& light, ShadeContext context) {
-    add_light(first, light, context);
-    if (compensation == nullptr) return;
     const ShadePoints* points = &first;
     ShadePoints found;
     for (uint32_t level = 1; level <= kMaxLevels && points->size() > 0; ++level) {
       context.progress.check();
+      add_light(*points, light, context);
       Counters counters;
-      const TracedPoints hits = compensation->trace(*points, level, context.progress, counters);
+      TracedPoints hits;
+      if (nearby != nullptr)
+        nearby->trace(*points, {level, compensation != nullptr, false}, context.progress, hits, counters);
+      if (compensation != nullptr) compensation->trace(*points, level, context.progress, hits, counters);
       context.stats.add(counters);
       for (size_t i = 0; i < hits.light.size(); ++i) light[slot(hits.group[i])][hits.pixel[i]] += hits.light[i];
+      if (compensation == nullptr) return;
       found = hits.points();
-      add_light(found, light, context);
       points = &found;
     }
   }
@@ -270,7 +272,7 @@ class Batch {
   const Scene& scene_;
   const std::span<const GroupMethod> methods_;
   const FrameOptions& options_;
-  const LightSurfaces* const lamps_;
+  const LightSurfaces* const light_surfaces_;
   std::vector<Rect> tiles_;
   std::vector<Pixel> pixels_;
   std::vector<PixelSums> sums_;
@@ -306,8 +308,9 @@ std::vector<uint32_t> light_groups(const Scene& scene) {
   return {groups.begin(), groups.end()};
 }
 
-void render_frame(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options, Film& film,
-                  ShadeContext context, const std::function<void(const Rect&)>& tile_done) {
+void render_frame(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options,
+                  const FrameLight& light, Film& film, ShadeContext context,
+                  const std::function<void(const Rect&)>& tile_done) {
   const std::vector<Rect> tiles = frame_tiles(options);
   size_t batch_size = 1;
   for (const GroupMethod& m : methods)
@@ -323,21 +326,21 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
     batches.emplace_back(first, last);
     first = last;
   }
-  std::optional<LightSurfaces> lamps;
-  if (scene.may_be_specular()) lamps.emplace(scene);
+  std::optional<LightSurfaces> light_surfaces;
+  if (scene.may_be_specular()) light_surfaces.emplace(scene);
   std::optional<ClampCompensation> compensation;
-  if (options.compensate > 0.0f)
-    compensation.emplace(scene, options.compensate, options.spheres, options.seed, context.progress);
+  if (light.compensated != nullptr)
+    compensation.emplace(scene, *light.compensated, light.nearby, light.spheres, options.seed);
   context.progress.begin("render", size_t{options.crop.width()} * options.crop.height());
   tbb::parallel_for(
       tbb::blocked_range<size_t>(0, batches.size(), 1),
       [&](const tbb::blocked_range<size_t>& range) {
         for (size_t b = range.begin(); b < range.end(); ++b) {
           context.progress.check();
-          Batch batch(scene, methods, options, lamps ? &*lamps : nullptr);
+          Batch batch(scene, methods, options, light_surfaces ? &*light_surfaces : nullptr);
           for (size_t t = batches[b].first; t < batches[b].second; ++t) batch.add_tile(tiles[t]);
           batch.collect(context);
-          batch.shade(compensation ? &*compensation : nullptr, context);
+          batch.shade(light.nearby, compensation ? &*compensation : nullptr, context);
           context.progress.check();
           batch.write(film);
           context.progress.advance(batch.pixel_count());

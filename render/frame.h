@@ -6,6 +6,8 @@
 
 #include "film/film.h"
 #include "integrators/integrator.h"
+#include "render/clamp.h"
+#include "render/nearby_lights.h"
 
 namespace lumicut {
 
@@ -13,9 +15,7 @@ struct FrameOptions {
   uint32_t width = 0, height = 0, samples = 1, tile_size = 64;
   Rect crop;  // inside width × height
   uint64_t seed = 1;
-  float compensate = 0.0f;  // distance of the clamp whose loss rays bring back; 0: none [render/clamp_compensation.h]
-  bool spheres = false;     // virtual lights are: the clamp takes direct light alone
-  // Of a render in passes: samples go on from here in the pixel's sequence, and a single one lies at random too.
+  // Of a render in iterations: samples go on from here in the pixel's sequence, and a single one lies at random too.
   struct CameraSamples {
     uint64_t seed;  // the same in all passes
     uint64_t first;
@@ -23,8 +23,7 @@ struct FrameOptions {
   };
   std::optional<CameraSamples> camera_samples;
   bool illuminance = false;  // fill that channel: about as long again
-  LUMICUT_FIELDS(FrameOptions, width, height, samples, tile_size, crop, seed, compensate, spheres, camera_samples,
-                 illuminance)
+  LUMICUT_FIELDS(FrameOptions, width, height, samples, tile_size, crop, seed, camera_samples, illuminance)
 };
 
 // Tiles of the crop in the order they are rendered.
@@ -36,12 +35,20 @@ struct GroupMethod {
   const Integrator* method;  // null: the group has no virtual lights
 };
 
+// What brings light beside the virtual lights. All outlive the frame.
+struct FrameLight {
+  const NearbyLights* nearby = nullptr;  // null: the clamp keeps what it takes from emitters
+  const Clamp* compensated = nullptr;    // its loss is brought back by rays; null: it is not
+  bool spheres = false;                  // virtual lights are, and lose nothing by it
+};
+
 // Light groups that something of the scene belongs to that emits, rising.
 std::vector<uint32_t> light_groups(const Scene& scene);
 
 // Renders into `film` (whose crop is options.crop), whose groups are those of `methods`, or none where there is one method
 // for all light. `tile_done` is called from any thread, once a tile, after its pixels are written. Throws Error(cancelled).
-void render_frame(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options, Film& film,
-                  ShadeContext context, const std::function<void(const Rect&)>& tile_done);
+void render_frame(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options,
+                  const FrameLight& light, Film& film, ShadeContext context,
+                  const std::function<void(const Rect&)>& tile_done);
 
 }  // namespace lumicut

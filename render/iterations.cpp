@@ -20,8 +20,10 @@ Params params_of_iteration(const Params& params, uint32_t iteration, const Scene
   const double shrink = std::pow(iteration + 1.0, -0.25);
   if (const double scale = sphere_scale(of) * shrink; scale > 0.0)
     of.sphere_scale = static_cast<float>(std::max(scale, 0.001));
-  if (!of.compensate)
+  if (!of.compensate) {
     if (const double clamp = clamp_distance(of, scene) * shrink; clamp > 0.0) of.clamp_distance = clamp;
+    of.clamp_lights *= shrink * shrink;  // within an area
+  }
   return params.with(of);
 }
 

@@ -2,76 +2,80 @@
 
 #include "bsdf/point_bsdf.h"
 #include "clustering/light_kernel.h"
-#include "core/rng.h"
 #include "core/sampling.h"
-#include "lights/light_surfaces.h"
+#include "scene/rng_at_point.h"
 
 namespace lumicut {
 
-namespace {
+// Shadow rays that wait to be traced, and what they bring.
+struct NearbyLights::Waiting {
+  std::vector<Ray> shadows;
+  std::vector<Rgb> light;
+  std::vector<uint32_t> pixel, group;
+};
 
-constexpr int64_t kMaxCells = 4096;  // of one light: larger ones are tried at every point
-
-// Box of what emits.
-Aabb bounds_of(const Light& l) {
-  Aabb box;
-  if (l.type == LightType::rectangle || l.type == LightType::disk) {
-    for (int k = 0; k < 4; ++k)
-      box.extend(l.position + l.u * (k % 2 == 0 ? -0.5f : 0.5f) + l.v * (k / 2 == 0 ? -0.5f : 0.5f));
-  } else {
-    const float r = l.type == LightType::point ? l.radius : 0.0f;
-    box.extend(l.position - Vec3f{r, r, r});
-    box.extend(l.position + Vec3f{r, r, r});
+// What the samples of one point bring of a group is one entry.
+void NearbyLights::trace_shadows(Waiting& waiting, TracedPoints& hits, Counters& counters) const {
+  scene_.accel().occluded(waiting.shadows);
+  counters.rays += waiting.shadows.size();
+  for (size_t i = 0; i < waiting.shadows.size(); ++i) {
+    if (waiting.shadows[i].tfar < 0.0f) continue;
+    if (!hits.light.empty() && hits.pixel.back() == waiting.pixel[i] && hits.group.back() == waiting.group[i])
+      hits.light.back() += waiting.light[i];
+    else
+      hits.add(waiting.light[i], waiting.pixel[i], waiting.group[i]);
   }
-  return box;
+  waiting.shadows.clear(), waiting.light.clear(), waiting.pixel.clear(), waiting.group.clear();
 }
 
-}  // namespace
-
-NearbyLights::NearbyLights(const Scene& scene, const LightSampler& emitters, float distance, const Progress& progress)
-    : scene_(scene), sampler_(emitters), distance_(distance) {
-  for (uint32_t i = 0; i < scene.lights().size(); ++i) {
-    if (i % 64 == 0) progress.check();  // thousands of cells each
-    const Light& light = scene.lights()[i];
-    if (light.type == LightType::sun || !(max_component(light.value) > 0.0f)) continue;
-    const auto index = static_cast<uint32_t>(lamps_.size());
-    lamps_.push_back(i);
-    const Aabb box = bounds_of(light);
-    const Vec3f reach{distance, distance, distance};
-    const Vec3f cells = (box.hi - box.lo + reach * 2.0f) / distance;
-    if (!((double{cells.x} + 1) * (double{cells.y} + 1) * (double{cells.z} + 1) <= static_cast<double>(kMaxCells))) {
-      large_.push_back(index);
-      continue;
+void NearbyLights::trace(const ShadePoints& points, const Options& options, const Progress& progress,
+                         TracedPoints& hits, Counters& counters) const {
+  constexpr size_t kPart = 4096;  // rays
+  Waiting waiting;
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (i % 4096 == 0) progress.check();
+    if (!near_.near(points.position_at(i))) continue;
+    const SurfacePoint point = points.get(i);
+    const PointBsdf bsdf(point);
+    if (bsdf.black()) continue;
+    Rng rng = rng_at_point(scene_, point, hash64(seed_, options.level), Stage::nearby_lights);
+    const float shift_u = rng.next_float(), shift_v = rng.next_float();
+    for (uint32_t k = 0; k < kSamples; ++k) {
+      const float choice = (static_cast<float>(k) + rng.next_float()) / kSamples;
+      // Even for any number of samples. [Roberts 2018: R2]
+      const float u = shift_u + static_cast<float>(k) * 0.75487767f, v = shift_v + static_cast<float>(k) * 0.5698403f;
+      const auto s =
+          near_.sample(point.position, std::min(choice, 0x1.fffffep-1f), u - std::floor(u), v - std::floor(v));
+      if (!s) continue;
+      Rgb light = light_point(s->vpl, s->vpl.intensity * (1.0f / kSamples), {}, point);
+      if (!(max_component(light) > 0.0f) || !is_finite(light)) continue;
+      const Vec3f to_light = s->vpl.position - point.position;
+      if (options.rays && s->found_by_rays)
+        light *= power_heuristic(kSamples * s->density, bsdf.pdf(normalize(to_light)));
+      Ray ray;  // ends before a mesh, which blocks
+      ray.org = point.position, ray.dir = to_light + s->vpl.normal * s->offset;
+      ray.tnear = 0.0f, ray.tfar = 1.0f;
+      waiting.shadows.push_back(ray), waiting.light.push_back(light);
+      waiting.pixel.push_back(options.by_point ? static_cast<uint32_t>(i) : point.pixel);
+      waiting.group.push_back(s->vpl.group);
     }
-    const Cell lo = cell(box.lo - reach), hi = cell(box.hi + reach);
-    for (int64_t z = lo.z; z <= hi.z; ++z)
-      for (int64_t y = lo.y; y <= hi.y; ++y)
-        for (int64_t x = lo.x; x <= hi.x; ++x) cells_[key({x, y, z})].push_back(index);
+    if (waiting.shadows.size() >= kPart) {
+      progress.check();
+      trace_shadows(waiting, hits, counters);
+    }
   }
+  trace_shadows(waiting, hits, counters);
 }
 
-NearbyLights::Cell NearbyLights::cell(const Vec3f& p) const {
-  const Vec3f at = (p - (scene_.bounds().empty() ? Vec3f{} : scene_.bounds().lo)) / distance_;
-  const auto floor = [](float v) { return static_cast<int64_t>(std::floor(std::clamp(v, -1e9f, 1e9f))); };
-  return {floor(at.x), floor(at.y), floor(at.z)};
+float NearbyLights::light_share(const Vec3f& origin, uint32_t light, float distance, float pdf) const {
+  const NearLights::Found f = near_.find_light(origin, light, distance);
+  return f.lost > 0.0f ? f.lost * power_heuristic(pdf, kSamples * f.density) : 0.0f;
 }
 
-// Cells that share a key only cost time: every light is measured again at the point.
-uint64_t NearbyLights::key(const Cell& c) {
-  return hash64(hash64(static_cast<uint64_t>(c.x), static_cast<uint64_t>(c.y)), static_cast<uint64_t>(c.z));
-}
-
-Rgb NearbyLights::lost_light(uint32_t lamp, const Vpl& vpl, const SurfacePoint& point) const {
-  const float d2 = length2(vpl.position - point.position), c2 = distance_ * distance_;
-  if (!(d2 < c2)) return {};
-  Rgb lost = light_point(vpl, vpl.intensity, {0.0f, scene_.profiles()}, point) * (1.0f - d2 / c2);
-  const Light& light = scene_.lights()[lamp];
-  if (LightSurfaces::has(light) && max_component(lost) > 0.0f) {
-    const Vec3f to_light = normalize(vpl.position - point.position);
-    const double cosine = std::max(1e-9f, -dot(vpl.normal, to_light));
-    lost = lost * power_heuristic(d2 / (cosine * LightSurfaces::area(light)), PointBsdf(point).pdf(to_light));
-  }
-  return lost;
+float NearbyLights::triangle_share(const Vec3f& origin, const RayHit& hit, float pdf) const {
+  const NearLights::Found f =
+      near_.find_triangle(origin, hit.hit.geom, hit.hit.prim, scene_.instance_of(hit.hit), hit.ray.tfar);
+  return f.lost > 0.0f ? f.lost * power_heuristic(pdf, kSamples * f.density) : 0.0f;
 }
 
 }  // namespace lumicut

@@ -1,53 +1,43 @@
-// Lights that are near a point: what the clamp takes from them is given back by sampling them. They are invisible, so no
-// ray finds them.
+// Light that the clamp takes from virtual lights on emitters near a point, brought back by samples of those emitters:
+// direct light is never clamped away. [lights/near_lights.h]
 #pragma once
 
-#include <unordered_map>
-#include <vector>
-
-#include "bsdf/shade_points.h"
-#include "core/progress.h"
-#include "lights/light_sampler.h"
+#include "core/stats.h"
+#include "lights/near_lights.h"
+#include "render/traced_points.h"
 
 namespace lumicut {
 
 class NearbyLights {
  public:
-  // `distance`: that of the clamp, above 0. Throws Error(cancelled).
-  NearbyLights(const Scene& scene, const LightSampler& emitters, float distance, const Progress& progress);
-  bool empty() const { return lamps_.empty(); }
+  // Samples of each point that lights are near to: few beside the shadow rays of a cut, and then it is hardly noisy.
+  static constexpr uint32_t kSamples = 16;
 
-  // What one sample of each near light gives the point beyond its clamped light, before visibility: fn(vpl, radiance).
-  // Weighted for rays of the point's reflectance that find the same lights [lights/light_surfaces.h].
-  template <typename Fn>
-  void for_each_share(const SurfacePoint& point, Rng& rng, Fn&& fn) const {
-    for (uint32_t i : large_) share(i, point, rng, fn);
-    if (cells_.empty()) return;
-    const auto found = cells_.find(key(cell(point.position)));
-    if (found == cells_.end()) return;
-    for (uint32_t i : found->second) share(i, point, rng, fn);
-  }
+  // All outlive this.
+  NearbyLights(const Scene& scene, const NearLights& near, uint64_t seed) : scene_(scene), near_(near), seed_(seed) {}
+
+  struct Options {
+    uint32_t level = 0;     // surfaces since the camera
+    bool rays = false;      // rays by the points' reflectance find the same lights, and are weighted for that
+    bool by_point = false;  // TracedPoints::pixel numbers points, not their pixels
+  };
+  // Appends what samples bring to `hits`. Deterministic: numbers belong to the places of points. Throws
+  // Error(cancelled).
+  void trace(const ShadePoints& points, const Options& options, const Progress& progress, TracedPoints& hits,
+             Counters& counters) const;
+
+  // Of a ray from `origin` by a reflectance of density `pdf` that finds a rectangle or disk, or a triangle: the share of
+  // what it finds that counts, the rest being that of virtual lights and samples.
+  float light_share(const Vec3f& origin, uint32_t light, float distance, float pdf) const;
+  float triangle_share(const Vec3f& origin, const RayHit& hit, float pdf) const;
 
  private:
-  struct Cell {
-    int64_t x, y, z;
-  };
-  Cell cell(const Vec3f& p) const;
-  static uint64_t key(const Cell& c);
-  template <typename Fn>
-  void share(uint32_t lamp, const SurfacePoint& point, Rng& rng, Fn&& fn) const {
-    const Vpl vpl = sampler_.sample_lamp(lamps_[lamp], rng);
-    const Rgb lost = lost_light(lamps_[lamp], vpl, point);
-    if (max_component(lost) > 0.0f) fn(vpl, lost);
-  }
-  Rgb lost_light(uint32_t lamp, const Vpl& vpl, const SurfacePoint& point) const;
+  struct Waiting;
+  void trace_shadows(Waiting& waiting, TracedPoints& hits, Counters& counters) const;
 
   const Scene& scene_;
-  const LightSampler& sampler_;
-  float distance_;
-  std::vector<uint32_t> lamps_;  // of the scene
-  std::vector<uint32_t> large_;  // of lamps_: near everywhere
-  std::unordered_map<uint64_t, std::vector<uint32_t>> cells_;
+  const NearLights& near_;
+  const uint64_t seed_;
 };
 
 }  // namespace lumicut

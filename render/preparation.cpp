@@ -13,6 +13,20 @@ std::string tracing_key(const VplOptions& options) {
   return key.text();
 }
 
+void Prepared::place_lights(LightSource source, const Progress& progress) {
+  const CommonParams& common = params->common();
+  clamp = std::make_unique<const Clamp>(*vpls, common, *scene, progress);
+  standing_off = off_surfaces(*vpls, *scene);
+  clamp->set_on(standing_off);
+  standing_off.profiles.prefer(scene->profiles());
+  // One distance for all, without compensation, clamps direct light too, as in the papers.
+  const double within = clamp->lights_on_emitters(vpls->extended);
+  if (source != LightSource::virtual_lights || vpls->extended == 0 || !(within > 0.0 || common.compensate)) return;
+  if (emitters == nullptr) emitters = std::make_shared<const LightSampler>(*scene, &progress);
+  near = std::make_unique<const NearLights>(*emitters, vpls->extended, within, clamp->distance(), progress);
+  if (!near->empty()) nearby = std::make_unique<const NearbyLights>(*scene, *near, common.seed);
+}
+
 void Preparation::prepare(const Scene& scene, std::shared_ptr<const void> scene_owner, const Params& with,
                           Progress& progress, Stats& into) {
   if (host_lights != nullptr && sphere_scale(with.common()) > 0.0f &&
@@ -44,18 +58,21 @@ void Preparation::prepare(const Scene& scene, std::shared_ptr<const void> scene_
     next->vpls = host_lights;
   } else if (same_source && prepared->vpls_key == tracing) {
     next->vpls = prepared->vpls;
+    next->emitters = prepared->emitters;
   } else if (entry.light_source == LightSource::emitters) {
     next->vpls = std::make_shared<VplSet>();
   } else {
     const PhaseTimer timer(into, "light paths");
-    next->vpls = std::make_shared<VplSet>(trace_vpls(scene, options, progress));
+    next->emitters = same_scene && prepared->emitters != nullptr
+                         ? prepared->emitters
+                         : std::make_shared<const LightSampler>(scene, &progress);
+    next->vpls = std::make_shared<VplSet>(trace_vpls(scene, *next->emitters, options, progress));
   }
   progress.check();
   into.set_value("vpls", static_cast<double>(next->vpls->lights.size()));
   into.set_value("light_paths", static_cast<double>(next->vpls->light_paths));
   next->method = entry.create();
-  next->standing_off = off_surfaces(*next->vpls, scene);
-  next->standing_off.profiles.prefer(scene.profiles());
+  next->place_lights(entry.light_source, progress);
   next->method->prepare(scene, next->standing_off, *next->params, {progress, into});
   progress.check();
   prepared = std::move(next);

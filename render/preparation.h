@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "integrators/integrator.h"
+#include "render/clamp.h"
+#include "render/nearby_lights.h"
 
 namespace lumicut {
 
@@ -19,12 +21,19 @@ struct Prepared {
   const Scene* scene = nullptr;
   std::shared_ptr<const void> scene_owner;  // keeps the scene, where a host may release it
   uint64_t scene_version = 0;
-  std::string params_key, vpls_key;    // the parameters it was made with: all, those of light tracing
-  uint64_t host_lights = 0;            // which of the host's sets; 0: traced
-  std::shared_ptr<const VplSet> vpls;  // as traced, or as the host gave them
-  VplSet standing_off;                 // the same, off their surfaces: what the method shades with
+  std::string params_key, vpls_key;              // the parameters it was made with: all, those of light tracing
+  uint64_t host_lights = 0;                      // which of the host's sets; 0: traced
+  std::shared_ptr<const VplSet> vpls;            // as traced, or as the host gave them
+  std::shared_ptr<const LightSampler> emitters;  // of the scene; null where nothing asks for them
+  std::unique_ptr<const Clamp> clamp;            // of `vpls`
+  std::unique_ptr<const NearLights> near;        // null: the clamp takes no direct light that comes back
+  std::unique_ptr<const NearbyLights> nearby;    // of `near`
+  VplSet standing_off;                           // `vpls`, off their surfaces and clamped: what the method shades with
   std::optional<Params> params;
   std::unique_ptr<Integrator> method;
+
+  // All that follows from `vpls` and `params`, beside the method. Throws Error(cancelled).
+  void place_lights(LightSource source, const Progress& progress);
 };
 
 struct Preparation {

@@ -25,10 +25,16 @@ RenderLoop::State RenderLoop::state() const {
 FrameOptions RenderLoop::frame_options(const Prepared& prepared) const {
   FrameOptions frame = options_;
   frame.seed = prepared.params->common().seed;
-  if (prepared.params->common().compensate && preparation_.entry.light_source == LightSource::virtual_lights)
-    frame.compensate = clamp_distance(prepared.params->common(), scene_);
-  frame.spheres = sphere_scale(prepared.params->common()) > 0.0f;
   return frame;
+}
+
+FrameLight RenderLoop::frame_light(const Prepared& prepared) const {
+  FrameLight light;
+  light.nearby = prepared.nearby.get();
+  if (prepared.params->common().compensate && preparation_.entry.light_source == LightSource::virtual_lights)
+    light.compensated = prepared.clamp.get();
+  light.spheres = sphere_scale(prepared.params->common()) > 0.0f;
+  return light;
 }
 
 std::vector<GroupMethod> RenderLoop::methods(const Prepared& prepared, std::vector<OfGroup>& of_groups,
@@ -63,8 +69,8 @@ void RenderLoop::run(Progress& progress, Stats& stats, const std::function<void(
   {
     const PhaseTimer timer(stats, "render");
     std::vector<OfGroup> of_groups;
-    render_frame(scene_, methods(prepared, of_groups, progress, stats), frame_options(prepared), film_,
-                 {progress, stats}, tile_done);
+    render_frame(scene_, methods(prepared, of_groups, progress, stats), frame_options(prepared), frame_light(prepared),
+                 film_, {progress, stats}, tile_done);
   }
   progress.check();
   const std::lock_guard lock(state_mutex_);
@@ -121,8 +127,8 @@ void RenderLoop::render_iterations(Progress& progress, Stats& stats,
     frame.camera_samples = {preparation_.params.common().seed, uint64_t{done} * frame.samples};
     {
       const PhaseTimer timer(stats, "render");
-      render_frame(scene_, methods(prepared, of_groups, progress, stats), frame, frame_film, {progress, stats},
-                   [&](const Rect& tile) {
+      render_frame(scene_, methods(prepared, of_groups, progress, stats), frame, frame_light(prepared), frame_film,
+                   {progress, stats}, [&](const Rect& tile) {
                      {
                        const std::lock_guard lock(film_mutex_);
                        mean.add(frame_film, tile, uint64_t{done} + 1, film_);

@@ -4,19 +4,23 @@ namespace lumicut {
 
 namespace {
 constexpr uint32_t kMaxSurfaces = 64;  // chance ends chains long before
-}
+constexpr uint32_t kSureBounces = 4;
+constexpr float kSureWeight = 0.25f;  // a smooth coat shows less, and would double the points to shade
+}  // namespace
 
-std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uint32_t pixel, Rng rng) {
+std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uint32_t pixel, Rng rng,
+                                    uint32_t bounces) {
   const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float(), luck = rng.next_float();
   const auto s = bsdf.sample_specular(choice, u, v);
   if (!s) return {};
   const Rgb weight = throughput * s->weight;
-  const float survive = std::min(1.0f, max_component(weight));
+  const float carried = max_component(weight);
+  const float survive = bounces < kSureBounces && carried >= kSureWeight ? 1.0f : std::min(1.0f, carried);
   if (!(luck < survive)) return {};
-  return ChainRay{bsdf.origin(s->flags), s->direction, weight / survive, pixel, rng};
+  return ChainRay{bsdf.origin(s->flags), s->direction, weight / survive, pixel, rng, bounces + 1};
 }
 
-void follow_chains(const Scene& scene, const LightSurfaces& lamps, std::vector<ChainRay> chains,
+void follow_chains(const Scene& scene, const LightSurfaces& light_surfaces, std::vector<ChainRay> chains,
                    const Progress& progress, TracedPoints& hits, Counters& counters) {
   std::vector<RayHit> rays;
   for (uint32_t depth = 0; depth < kMaxSurfaces && !chains.empty(); ++depth) {
@@ -29,10 +33,11 @@ void follow_chains(const Scene& scene, const LightSurfaces& lamps, std::vector<C
     for (size_t i = 0; i < chains.size(); ++i) {
       if (i % 4096 == 0) progress.check();
       const ChainRay& chain = chains[i];
-      if (!lamps.empty())
-        lamps.for_each_hit(chain.origin, chain.direction, rays[i].ray.tfar, [&](const LightSurfaces::Hit& lamp) {
-          hits.add(chain.throughput * lamp.radiance, chain.pixel, scene.lights()[lamp.lamp].group);
-        });
+      if (!light_surfaces.empty())
+        light_surfaces.for_each_hit(
+            chain.origin, chain.direction, rays[i].ray.tfar, [&](const LightSurfaces::Hit& seen) {
+              hits.add(chain.throughput * seen.radiance, chain.pixel, scene.lights()[seen.light].group);
+            });
       if (rays[i].hit.geom == kNoId) {
         const Rgb light = chain.throughput * scene.environment_radiance(chain.direction);
         if (max_component(light) > 0.0f) hits.add(light, chain.pixel, scene.environment().group);
@@ -45,7 +50,8 @@ void follow_chains(const Scene& scene, const LightSurfaces& lamps, std::vector<C
         point.attenuate(chain.throughput);
         if (!PointBsdf(point).black()) hits.found.push_back(point);
       }
-      if (auto ray = start_chain(at.bsdf, chain.throughput, chain.pixel, chain.rng)) next.push_back(*ray);
+      if (auto ray = start_chain(at.bsdf, chain.throughput, chain.pixel, chain.rng, chain.bounces))
+        next.push_back(*ray);
     }
     chains = std::move(next);
   }

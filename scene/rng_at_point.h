@@ -9,7 +9,7 @@
 namespace lumicut {
 
 inline Rng rng_at_point(const Scene& scene, const SurfacePoint& point, uint64_t seed, Stage stage) {
-  const Vec3f at = (point.position - scene.bounds().lo) / scene.radius();
+  const Vec3f at = (point.position - scene.extent().center()) / scene.extent().radius();
   const auto word = [](float a, float b) {
     return static_cast<uint64_t>(std::bit_cast<uint32_t>(a)) << 32 | std::bit_cast<uint32_t>(b);
   };

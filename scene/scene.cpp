@@ -10,6 +10,22 @@ namespace lumicut {
 
 namespace {
 
+// Some 16 units in the last place of the largest coordinate that the place of a hit is computed from.
+constexpr float kOffset = 2e-6f;
+constexpr size_t kMostExtentBoxes = 65536;
+
+float largest_coordinate(const Vec3f& p) { return max_component(max(p, -p)); }
+
+// Largest number that a point passes through on its way to the world.
+float largest_term(const Transform& t, const Vec3f& p) {
+  float largest = 0.0f;
+  for (int row = 0; row < 3; ++row) {
+    const float* m = &t.m[4 * row];
+    largest = std::max({largest, std::abs(m[0] * p.x), std::abs(m[1] * p.y), std::abs(m[2] * p.z), std::abs(m[3])});
+  }
+  return largest;
+}
+
 constexpr float kInvPi = 0.31830988618f;
 
 std::string short_text(float v) {
@@ -178,6 +194,11 @@ void Scene::commit(Progress& progress) {
   geometry.filter = this;
   std::vector<uint32_t> first_instance;
   Aabb bounds;
+  // Of groups of triangles, so that there are not too many.
+  size_t triangles = 0;
+  for (uint32_t m = 0; m < meshes_.size(); ++m) triangles += meshes_[m].triangle_count() * instance_count(m);
+  const size_t group = 3 * (1 + triangles / kMostExtentBoxes);
+  std::vector<Aabb> boxes;
   for (uint32_t m = 0; m < meshes_.size(); ++m) {
     const Mesh& mesh = meshes_[m];
     bool cutout = mesh.triangle_materials.empty() && mesh.triangle_count() > 0 && materials_[mesh.material].cutout();
@@ -191,6 +212,7 @@ void Scene::commit(Progress& progress) {
       Aabb box;
       for (size_t k = 0; k < mesh.indices.size(); ++k) {
         if (k % 65536 == 0) progress.check();
+        if (k > 0 && k % group == 0) boxes.push_back(box), bounds.extend(box), box = {};
         const uint32_t index = mesh.indices[k];
         const Vec3f p = t.point(mesh.positions[index]);
         box.extend(p);
@@ -199,9 +221,10 @@ void Scene::commit(Progress& progress) {
                       short_text(p.x) + ", " + short_text(p.y) + ", " + short_text(p.z) + "), beyond " +
                       short_text(kLargestCoordinate));
       }
-      bounds.extend(box);
+      boxes.push_back(box), bounds.extend(box);
     }
   }
+  SceneExtent extent(std::move(boxes));
 
   auto accel =
       trace_ ? trace_(geometry) : make_accel(config_.accel, geometry, {config_.robust, config_.builder}, &progress);
@@ -210,11 +233,7 @@ void Scene::commit(Progress& progress) {
   instanced_ = instanced;
   bounds_ = bounds;
   radius_ = bounds.empty() || bounds.diagonal() == 0.0f ? 1.0f : 0.5f * bounds.diagonal();
-  const float largest =
-      bounds.empty() ? 0.0f
-                     : std::max(max_component(bounds.hi), -std::min(bounds.lo.x, std::min(bounds.lo.y, bounds.lo.z)));
-  // 2e-5 of the radius is far below what is seen; 4e-6 of the coordinates is some 60 units in the last place.
-  epsilon_ = std::max(2e-5f * radius_, 4e-6f * largest);
+  extent_ = std::move(extent);
   committed_ = true;
   ++version_;
   progress.advance(1);
@@ -249,11 +268,15 @@ float Scene::opacity(uint32_t mesh_id, uint32_t prim, float u, float v) const {
   return opacity;
 }
 
+float Scene::offset_at(const Vec3f& position) const {
+  return kOffset * std::max(2.0f * largest_coordinate(position), extent_.radius());
+}
+
 SurfaceHit Scene::surface(const RayHit& rh) const {
   const Hit& hit = rh.hit;
   const Mesh& mesh = meshes_[hit.geom];
   const uint32_t* tri = &mesh.indices[3 * size_t{hit.prim}];
-  const Transform& to_world = instance(hit.geom, instanced_ ? hit.inst - first_instance_[hit.geom] : 0);
+  const Transform& to_world = instance(hit.geom, instance_of(hit));
   Vec3f p[3];
   for (int k = 0; k < 3; ++k) p[k] = instanced_ ? to_world.point(mesh.positions[tri[k]]) : mesh.positions[tri[k]];
   const float w = 1.0f - hit.u - hit.v;
@@ -264,6 +287,10 @@ SurfaceHit Scene::surface(const RayHit& rh) const {
   s.material = mesh.material_of(hit.prim);
   s.t = rh.ray.tfar;
   s.position = p[0] * w + p[1] * hit.u + p[2] * hit.v;
+  float largest = std::max({largest_coordinate(p[0]), largest_coordinate(p[1]), largest_coordinate(p[2])});
+  if (instanced_)  // by way of local coordinates, which may be larger
+    for (int k = 0; k < 3; ++k) largest = std::max(largest, largest_term(to_world, mesh.positions[tri[k]]));
+  s.offset = kOffset * largest;
   s.geometric_normal = normalize(cross(p[1] - p[0], p[2] - p[0]));
   // A mirroring instance turns the winding over; the front stays the front.
   if (instanced_) {
@@ -340,7 +367,7 @@ SurfaceInteraction Scene::interaction(const SurfaceHit& hit, const Vec3f& to_vie
   return {hit,
           emitted(hit, to_viewer),
           bsdf_parameters(hit.material, hit.uv),
-          {hit.position, hit.geometric_normal, hit.normal, to_viewer, epsilon_, pixel}};
+          {hit.position, hit.geometric_normal, hit.normal, to_viewer, hit.offset, pixel}};
 }
 
 BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv) const {

@@ -14,6 +14,7 @@
 #include "scene/light.h"
 #include "scene/light_profile.h"
 #include "scene/material.h"
+#include "scene/scene_extent.h"
 #include "scene/surface_interaction.h"
 #include "scene/texture.h"
 
@@ -77,7 +78,7 @@ class Scene final : private HitFilter {
   template <typename Visit>
   void for_each_part(Visit&& visit) const {
     const auto& [config, textures, materials, glass, coated, meshes, lights, profiles, environment, camera, has_camera,
-                 trace, accel, first_instance, instanced, committed, version, bounds, radius, epsilon] = *this;
+                 trace, accel, first_instance, instanced, committed, version, bounds, radius, extent] = *this;
     const bool host_trace = trace != nullptr;
     visit("accel", config);
     visit("host_trace", host_trace);
@@ -101,13 +102,17 @@ class Scene final : private HitFilter {
   bool has_camera() const { return has_camera_; }
   // World bounds of all instances; empty without geometry.
   const Aabb& bounds() const { return bounds_; }
-  // Half the diagonal of the bounds; 1 without geometry.
+  // Half the diagonal of the bounds; 1 without geometry. One distant object makes it as large as it likes: extent()
+  // serves where a picture could feel that.
   float radius() const { return radius_; }
-  // How far ray ends stand off surfaces: relative to the scene and to the largest coordinate's rounding.
-  float epsilon() const { return epsilon_; }
+  const SceneExtent& extent() const { return extent_; }
+  // How far ray ends stand off a place whose triangle is not known, such as a host's own point.
+  float offset_at(const Vec3f& position) const;
 
   size_t instance_count(uint32_t mesh) const { return std::max<size_t>(1, meshes_[mesh].instances.size()); }
   const Transform& instance(uint32_t mesh, uint32_t index) const;
+  // Which instance of its mesh a hit of `accel()` is on.
+  uint32_t instance_of(const Hit& hit) const { return instanced_ ? hit.inst - first_instance_[hit.geom] : 0; }
   // What a hit of `accel()` on that instance of that mesh carries in Hit::inst.
   uint32_t hit_instance(uint32_t mesh, uint32_t index) const {
     return instanced_ ? first_instance_[mesh] + index : kNoId;
@@ -168,7 +173,8 @@ class Scene final : private HitFilter {
   bool committed_ = false;
   uint64_t version_ = 0;
   Aabb bounds_;
-  float radius_ = 1.0f, epsilon_ = 1e-6f;
+  float radius_ = 1.0f;
+  SceneExtent extent_;
 };
 
 }  // namespace lumicut

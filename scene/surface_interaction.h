@@ -13,6 +13,7 @@ struct SurfaceHit {
   Vec2f uv;
   uint32_t material = 0, mesh = 0, triangle = 0;
   float t = 0.0f;
+  float offset = 0.0f;  // how far rays start from the surface: follows the size of its triangle and coordinates
 };
 
 // A hit as it is seen from one side: made once, by Scene::interaction.

@@ -193,7 +193,7 @@ void add_compare(CLI::App& app) {
       ->check(number_in(1e-4, 1e4));
   command
       ->add_option("--ignore-above", o->ignore_above,
-                   "Leave out pixels whose reference luminance is at least this (visible lamps)")
+                   "Leave out pixels whose reference luminance is at least this (visible lights)")
       ->check(number_in(0, 1e38));
   command
       ->add_option("--exposure", o->exposure,

@@ -303,7 +303,7 @@ void add_errors(CLI::App& app) {
       ->capture_default_str()
       ->check(CLI::Range(8, 1 << 24));
   command->add_option("--ignore-above", o->ignore_above,
-                      "Leave out pixels whose true luminance is at least this (visible lamps)");
+                      "Leave out pixels whose true luminance is at least this (visible lights)");
   command->add_option("-o,--output", o->folder,
                       "Folder for signed maps of each part (PNG), the four images (EXR) and the figures (JSON)");
   command->add_flag("--json", o->json, "Print JSON instead of text");

@@ -162,9 +162,9 @@ class FlythroughCommand {
 
   void set_host_lights() {
     if (o_.vpl_in.empty()) return;
-    const std::vector<lumicut_vpl> lights = io::read_vpls(o_.vpl_in);
-    if (lights.empty()) throw UsageError(fmt::format("--vpl-in {}: holds no light", o_.vpl_in));
-    io::check(api(), api().integrator_set_lights(integrator_.get(), lights.data(), lights.size()), o_.vpl_in);
+    const api::VplSet lights = io::read_vpls(o_.vpl_in);
+    if (lights.lights.empty()) throw UsageError(fmt::format("--vpl-in {}: holds no light", o_.vpl_in));
+    api::set_vpls(integrator_.get(), lights, api(), o_.vpl_in);
   }
 
   void prepare() {

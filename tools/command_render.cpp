@@ -155,7 +155,7 @@ class RenderCommand {
     if (o_.vpl_in.empty()) return;
     const NothingToLose reading;
     lights_ = io::read_vpls(o_.vpl_in);
-    if (lights_.empty()) throw UsageError(fmt::format("--vpl-in {}: holds no light", o_.vpl_in));
+    if (lights_.lights.empty()) throw UsageError(fmt::format("--vpl-in {}: holds no light", o_.vpl_in));
   }
 
   void read_scene() {
@@ -213,8 +213,7 @@ class RenderCommand {
   }
 
   void set_lights() {
-    if (lights_.empty()) return;
-    io::check(api(), api().integrator_set_lights(integrator_.get(), lights_.data(), lights_.size()), o_.vpl_in);
+    if (!o_.vpl_in.empty()) api::set_vpls(integrator_.get(), lights_, api(), o_.vpl_in);
   }
 
   void commit() {
@@ -255,15 +254,13 @@ class RenderCommand {
   // A square is less than the threads can share, and an integrator renders one at a time: so there are several of it,
   // on the same lights.
   void render_squares(const std::vector<lumicut_tile>& parts) {
-    const lumicut_vpl* lights = nullptr;
-    uint64_t light_count = 0;
-    io::check(api(), api().integrator_get_lights(integrator_.get(), &lights, &light_count), "virtual lights");
+    const api::VplSet lights = api::get_vpls(integrator_.get(), api(), "virtual lights");
     const size_t threads = o_.threads > 0 ? static_cast<size_t>(o_.threads) : std::thread::hardware_concurrency();
     std::vector<io::Handle<lumicut_integrator>> others;
     while (others.size() + 2 < std::min(parts.size(), threads + 2)) {
       others.emplace_back(api());
       create_integrator(others.back());
-      io::check(api(), api().integrator_set_lights(others.back().get(), lights, light_count), "virtual lights");
+      api::set_vpls(others.back().get(), lights, api(), "virtual lights");
       watcher_.watch(others.back().get());
       const lumicut_result prepared = api().integrator_prepare(others.back().get(), scene_.get());
       watcher_.watch(nullptr);
@@ -430,7 +427,7 @@ class RenderCommand {
         const ColorImage map = heat_map(read({counts.name, 1}).pixels, image.width, image.height, counts.title);
         io::write_png(heat_map_path(counts), map.pixels, map.width, map.height, 3);
       }
-    if (!o_.vpl_out.empty()) io::write_vpls(o_.vpl_out, lights, light_count);
+    if (!o_.vpl_out.empty()) io::write_vpls(o_.vpl_out, api::get_vpls(integrator_.get(), api(), "virtual lights"));
     if (!o_.stats.empty()) io::write_whole_file(o_.stats, io::json_text(stats, 2) + "\n");
     if (!o_.quiet)
       fmt::print("{}: {} lights, {}x{}, {:.2f} s, {:.0f} rays, {:.0f} bounds, {:.0f} clusters a pixel\n", o_.integrator,
@@ -471,7 +468,7 @@ class RenderCommand {
   io::Handle<lumicut_integrator> integrator_{library_.api()};
   std::vector<std::pair<lumicut_tile, io::Handle<lumicut_render>>> parts_;
   InterruptWatcher watcher_;             // ends before the handles that it may cancel
-  std::vector<lumicut_vpl> lights_;      // of --vpl-in
+  api::VplSet lights_;                   // of --vpl-in
   std::unique_ptr<io::SceneData> told_;  // at high verbosity, until it is told of
   std::vector<uint32_t> size_, crop_;
   lumicut_render_desc desc_{};

@@ -170,7 +170,7 @@ class Examiner {
     for (uint32_t m = 0; m < scene_.meshes.size(); ++m) shells_.push_back(find_shells(scene_, m));
     measure();
     count();
-    lamps();
+    lights();
     meshes();
     materials();
     scale();
@@ -321,7 +321,7 @@ class Examiner {
     }
   }
 
-  void lamps() {
+  void lights() {
     for (size_t i = 0; i < scene_.lights.size(); ++i) {
       const auto& l = scene_.lights[i];
       if (!(double{l.value} * largest(vec(l.color)) > 0))
@@ -475,7 +475,7 @@ class Examiner {
                         ninth, 100 * ninth / p_.radius));
       else if (p_.clamp > 0.5 * median)
         say("clamp", fmt::format("the clamp distance {:.4g} is more than half of the median distance {:.4g} the camera "
-                                 "sees: light near lamps and corners goes lost; set clamp_distance",
+                                 "sees: light near surfaces and corners goes lost; set clamp_distance",
                                  p_.clamp, median));
     }
     const auto around_camera = world.around(eye, p_.radius);
@@ -485,13 +485,13 @@ class Examiner {
         say("camera_inside", fmt::format("camera: {} is inside {}, a closed body whose front looks outwards",
                                          shown(eye), name(p.shell.mesh, p.shell.first_triangle)));
     }
-    lamps_inside(world, around_camera);
+    lights_inside(world, around_camera);
     emission(world, eye);
   }
 
-  void lamps_inside(const World& world, const std::vector<uint32_t>& around_camera) {
-    constexpr size_t kMostLamps = 1024;
-    for (size_t i = 0, tried = 0; i < scene_.lights.size() && tried < kMostLamps; ++i) {
+  void lights_inside(const World& world, const std::vector<uint32_t>& around_camera) {
+    constexpr size_t kMostLights = 1024;
+    for (size_t i = 0, tried = 0; i < scene_.lights.size() && tried < kMostLights; ++i) {
       const auto& l = scene_.lights[i];
       if (l.type == LUMICUT_SUN) continue;
       ++tried;

@@ -26,7 +26,7 @@ struct Preflight {                       // NOLINT(bugprone-exception-escape): n
 
 struct PreflightOptions {
   uint32_t width = 0, height = 0;  // of the image
-  double clamp_distance = 0, clamp_relative = 0.05;
+  double clamp_distance = 0, clamp_relative = 0;
 };
 
 // The integrator's clamp.

@@ -163,7 +163,8 @@ void exhaustive(const BenchMesh& mesh) {
   const auto scene = make_scene(mesh);
   Progress progress;
   Stats stats;
-  const VplSet vpls = off_surfaces(trace_vpls(*scene, {.count = sized(1000u, 50u)}, progress), *scene);
+  VplSet vpls = off_surfaces(trace_vpls(*scene, {.count = sized(1000u, 50u)}, progress), *scene);
+  for (Vpl& v : vpls.lights) v.clamp2 = 0.0025f * scene->radius() * scene->radius();
   const ShadePoints points = make_points(*scene, sized(256u, 32u));
   Params params(all_params(*find_integrator("exhaustive")));
   const auto integrator = find_integrator("exhaustive")->create();
@@ -183,10 +184,9 @@ void exhaustive(const BenchMesh& mesh) {
   std::vector<Vec3f> ends;
   std::vector<Packet> packets;
   auto lit = std::make_unique<LitPoints>();
-  const float clamp = clamp_distance(params.common(), *scene);
   for (size_t first = 0; first < points.size(); first += kMaxLit)
     for (const Vpl& v : vpls.lights) {
-      light_points(v, v.intensity, clamp * clamp, points, first, std::min(kMaxLit, points.size() - first), *lit);
+      light_points(v, v.intensity, {}, points, first, std::min(kMaxLit, points.size() - first), *lit);
       packets.push_back({v.position, static_cast<uint32_t>(ends.size()), static_cast<uint32_t>(lit->count)});
       for (size_t i = 0; i < lit->count; ++i) ends.push_back({lit->x[i], lit->y[i], lit->z[i]});
     }

@@ -84,8 +84,8 @@ std::pair<uint32_t, uint32_t> IlluminationCut::coarse_pairs(const PointNodes& no
                                                             LitPoints& lit, float* irradiance, Counters& total) const {
   const LightNode& node = tree_.node(item.node);
   alignas(64) float bounds[kLanes], distances2[kLanes];
-  pair_bounds(node, nodes, falloff_.clamp2, bounds);
-  pair_distances2(node, nodes, falloff_.clamp2, distances2);
+  pair_bounds(node, nodes, bounds);
+  pair_distances2(node, nodes, distances2);
   const float size2 = node.kind == VplKind::directional ? 0.0f : length2(node.half);
   const bool narrow = node.leaf() || node.kind == VplKind::omni || node.cos_half > 0.94f;  // 20 degrees
   uint32_t accept = 0, split = 0, descend = 0;

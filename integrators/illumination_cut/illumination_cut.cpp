@@ -7,8 +7,7 @@ namespace lumicut::illumination_cut {
 void IlluminationCut::prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) {
   scene_ = &scene;
   const auto& own = params.own<IlluminationCutParams>();
-  const float clamp = clamp_distance(params.common(), scene);
-  falloff_ = {clamp * clamp, vpls.profiles};
+  falloff_ = Falloff(vpls.profiles);
   error_ = own.error;
   floor_ = own.dark_floor;
   visibility_ = own.visibility;
@@ -16,7 +15,7 @@ void IlluminationCut::prepare(const Scene& scene, const VplSet& vpls, const Para
   seed_ = params.common().seed;
   separation2_ = own.coarse_separation * own.coarse_separation;
   const PhaseTimer timer(context.stats, "light tree");
-  tree_ = LightTree::build(vpls.lights, {LightTree::Method::agglomerative, 2.0f * scene.radius(), 1, seed_},
+  tree_ = LightTree::build(vpls.lights, {LightTree::Method::agglomerative, 2.0f * scene.extent().radius(), 1, seed_},
                            context.progress);
   means_.clear();
   if (own.representative == Representation::mean) find_means(context.progress);
@@ -58,7 +57,7 @@ float IlluminationCut::gives(uint32_t index, const Vec3f& position, const Vec3f&
   const Vec3f to_light = v / std::sqrt(dist2);
   const bool faces = node.kind == VplKind::oriented || node.kind == VplKind::sphere;
   const float cosine = faces ? mean_cosine(mean.direction, mean.scatter, to_light) : 1.0f;
-  const float least2 = node.kind == VplKind::sphere ? mean.radius * mean.radius : falloff_.clamp2;
+  const float least2 = node.kind == VplKind::sphere ? mean.radius * mean.radius : node.least_distance2;
   return light * cosine * std::max(kHorizon, dot(normal, to_light)) / std::max(dist2, least2);
 }
 
@@ -113,7 +112,7 @@ void IlluminationCut::shade_batch(const ShadePoints& batch, std::span<Rgb> radia
   PointTree points;
   {
     const PhaseTimer timer(context.stats, "point tree");
-    points = PointTree::build(batch, scene_->radius() / 8.0f, context.progress);
+    points = PointTree::build(batch, scene_->extent().radius() / 8.0f, context.progress);
   }
   std::vector<float> coarse;
   {

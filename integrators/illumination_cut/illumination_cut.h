@@ -158,7 +158,7 @@ class IlluminationCut final : public Integrator {
     float radius = 0.0f;
   };
   std::vector<Mean> means_;  // a node; empty: the tree's own representatives serve
-  Falloff falloff_ = 0.0f;
+  Falloff falloff_;
   float error_ = 0.02f, floor_ = 0.01f, separation2_ = 0.0225f;
   Visibility visibility_ = Visibility::sampling;
   bool stochastic_ = false;

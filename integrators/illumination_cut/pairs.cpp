@@ -38,7 +38,7 @@ void IlluminationCut::region_pairs(const PointTree& points, size_t region, Works
     if (progress.cancelled()) return;
     const LightNode& node = tree_.node(item.node);
     alignas(64) float bounds[kLanes];
-    pair_bounds(node, nodes, falloff_.clamp2, bounds);
+    pair_bounds(node, nodes, bounds);
     work.total.bounds += static_cast<uint64_t>(std::popcount(item.groups));
     const float size2 = node.kind == VplKind::directional ? 0.0f : length2(node.half);
     uint32_t split = 0;
@@ -86,7 +86,7 @@ void IlluminationCut::group_pairs(const PointTree& points, size_t region, size_t
     const LightNode& node = tree_.node(item.node);
     const float size2 = node.kind == VplKind::directional ? 0.0f : length2(node.half);
     alignas(64) float bounds[kLanes];
-    pair_bounds(node, nodes, falloff_.clamp2, bounds);
+    pair_bounds(node, nodes, bounds);
     GroupLanes accepted{};
     bool any = false, rest = false;
     for (size_t j = 0; j < kLanes; ++j) {
@@ -105,7 +105,7 @@ void IlluminationCut::group_pairs(const PointTree& points, size_t region, size_t
         rest = true;  // no point of the leaf would do better by much
       } else {
         alignas(64) float point_bounds[kLanes];
-        light_node_bounds(node, work.blocks[leaf], falloff_.clamp2, point_bounds);
+        light_node_bounds(node, work.blocks[leaf], point_bounds);
         const float* allowed = work.allowed + leaf * kLeaf;
         uint32_t ok = 0, reached = 0;
         for (size_t i = 0; i < kLanes; ++i) {

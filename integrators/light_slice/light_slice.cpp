@@ -60,8 +60,7 @@ class LightSlice final : public Integrator {
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
     const auto& own = params.own<LightSliceParams>();
-    const float clamp = clamp_distance(params.common(), scene);
-    falloff_ = {clamp * clamp, vpls.profiles};
+    falloff_ = Falloff(vpls.profiles);
     slices_ = own.slices;
     columns_ = own.columns;
     lights_ = order_lights(vpls.lights, &context.progress);
@@ -80,7 +79,7 @@ class LightSlice final : public Integrator {
     Slices slices;
     {
       const PhaseTimer timer(context.stats, "slices");
-      slices = build_slices(points, slices_, kLeastPoints, scene_->radius(), &context.progress);
+      slices = build_slices(points, slices_, kLeastPoints, scene_->extent().radius(), &context.progress);
     }
     // Which of its pixel's points each is.
     std::vector<uint32_t> sample(points.size(), 0);
@@ -112,7 +111,7 @@ class LightSlice final : public Integrator {
       ShadePoints rows;
       for (size_t s = begin; s < end; ++s) {
         rows.push(row_point(points.get(slices.representatives[s])));
-        features.push_back(point_feature(points, slices.representatives[s], scene_->radius()));
+        features.push_back(point_feature(points, slices.representatives[s], scene_->extent().radius()));
       }
       rows.finish();
       matrix = LightMatrix::build(*scene_, lights_, rows, falloff_, kShadowedShare, context.progress);
@@ -211,7 +210,7 @@ class LightSlice final : public Integrator {
   const Scene* scene_ = nullptr;
   std::vector<Vpl> lights_;
   std::vector<std::vector<float>> times_;  // of each choice of representatives
-  Falloff falloff_ = 0.0f;
+  Falloff falloff_;
   size_t slices_ = 0, columns_ = 0;
 };
 

@@ -119,7 +119,7 @@ void AddNode(const LightTree& tree, const Accel& accel, const CutOptions& o, uin
   for (size_t g = 0; g < kCutGroups; ++g) {
     e.active[g] = 0;
     if (active[g] == 0) continue;
-    NodeBounds(node, cuts.blocks[g], o.falloff.clamp2, e.bound[g]);
+    NodeBounds(node, cuts.blocks[g], e.bound[g]);
     uint32_t reached = 0;
     for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
       const auto asked = MaskOf(d, active[g], i);

@@ -16,7 +16,7 @@ inline constexpr size_t kCutGroups = 4;
 inline constexpr size_t kCutPoints = kCutGroups * kLanes;
 
 struct CutOptions {
-  Falloff falloff = 0.0f;
+  Falloff falloff;
   float error = 0.02f;  // largest share of a point's luminance that a cluster's bound may reach
   uint32_t max_cut = 0xffffffffu;
   uint32_t slot = 0;                   // of LightTree::representative

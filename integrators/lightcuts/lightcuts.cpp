@@ -27,14 +27,13 @@ class Lightcuts final : public Integrator {
   void prepare(const Scene& scene, const VplSet& vpls, const Params& params, ShadeContext context) override {
     scene_ = &scene;
     const auto& own = params.own<LightcutsParams>();
-    const float clamp = clamp_distance(params.common(), scene);
-    falloff_ = {clamp * clamp, vpls.profiles};
+    falloff_ = Falloff(vpls.profiles);
     error_ = kClusterShare * own.error;
     max_cut_ = own.max_cut == 0 ? std::numeric_limits<uint32_t>::max() : own.max_cut;
     seed_ = params.common().seed;
     const PhaseTimer timer(context.stats, "light tree");
-    tree_ =
-        LightTree::build(vpls.lights, {own.tree, 2.0f * scene.radius(), own.representatives, seed_}, context.progress);
+    tree_ = LightTree::build(vpls.lights, {own.tree, 2.0f * scene.extent().radius(), own.representatives, seed_},
+                             context.progress);
     context.stats.set_value("light_tree_bytes", static_cast<double>(tree_.bytes()));
   }
 
@@ -67,7 +66,7 @@ class Lightcuts final : public Integrator {
  private:
   const Scene* scene_ = nullptr;
   LightTree tree_;
-  Falloff falloff_ = 0.0f;
+  Falloff falloff_;
   float error_ = 0.02f;
   uint32_t max_cut_ = 0;
   uint64_t seed_ = 1;

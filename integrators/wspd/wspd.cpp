@@ -165,7 +165,7 @@ class Wspd final : public Integrator {
       options.separation = separation_;
       options.normal_threshold = params.own<WspdParams>().normal_threshold;
       options.seed = params.common().seed;
-      options.epsilon = scene.epsilon();
+      options.epsilon = 2e-5f * scene.extent().radius();
       options.accel = cubemaps_ ? &scene.accel() : nullptr;
       options.profiles = &vpls.profiles;
       tree_ = WspdTree::build(vpls.lights, options, context.progress);
@@ -206,8 +206,7 @@ class Wspd final : public Integrator {
   void take(const Scene& scene, const VplSet& vpls, const Params& params) {
     scene_ = &scene;
     const auto& own = params.own<WspdParams>();
-    const float clamp = clamp_distance(params.common(), scene);
-    falloff_ = {clamp * clamp, vpls.profiles};
+    falloff_ = Falloff(vpls.profiles);
     separation_ = own.separation;
     point_separation_ = separation_ / (1.0f - separation_);
     bright_ = own.bright;
@@ -411,7 +410,7 @@ class Wspd final : public Integrator {
 
   const Scene* scene_ = nullptr;
   WspdTree tree_;
-  Falloff falloff_ = 0.0f;
+  Falloff falloff_;
   float separation_ = 0.25f, point_separation_ = 1.0f / 3.0f, bright_ = 0.01f;
   bool sampling_ = true, cubemaps_ = true;
   size_t largest_block_ = kBlock;

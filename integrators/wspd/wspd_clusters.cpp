@@ -152,7 +152,7 @@ void WspdTree::find_groups(const Options& options, Progress& progress) {
 // Eq. 2.21, with at most kSampled of the cluster's lights.
 void WspdTree::find_cubemaps(const Options& options, Progress& progress) {
   constexpr size_t kChunk = 64, kSampled = 6;
-  Falloff falloff = 0.0f;
+  Falloff falloff;
   falloff.profiles = options.profiles;
   const std::vector<uint8_t> used = used_nodes();
   progress.begin("local visibility", nodes_.size());

@@ -39,7 +39,7 @@ class LightUnits(unittest.TestCase):
             world = bpy.context.scene.world.cycles
             world.sampling_method, world.sample_map_resolution = "MANUAL", 256
             reference = h.render()
-            h.set_lumicut("exhaustive", of_pixel, vpls=lights, max_depth=0, clamp_relative=0.001, direct_share=1.0)
+            h.set_lumicut("exhaustive", of_pixel, vpls=lights, max_depth=0, direct_share=1.0)
             ours = h.render()
         return ours, reference
 

@@ -24,7 +24,7 @@ Material glass(float roughness, float ior = 1.5f, const Rgb& base = {1, 1, 1}) {
 struct OneSurface {
   explicit OneSurface(const Material& m) {
     scene.set_materials({m});
-    hit.position = {1, 2, 3}, hit.geometric_normal = hit.normal = {0, 0, 1};
+    hit.position = {1, 2, 3}, hit.offset = 1e-5f, hit.geometric_normal = hit.normal = {0, 0, 1};
   }
   Bsdf bsdf(const Vec3f& to_viewer) const { return scene.interaction(hit, to_viewer).bsdf; }
   std::optional<BsdfSample> follow(const Vec3f& to_viewer, float choice, float u = 0.3f, float v = 0.6f) const {

@@ -12,17 +12,18 @@ TEST(Bounds, AMillionRandomPairsNeverPassTheBoundOfTheirCluster) {
     Rng rng(trial, Stage::test);
     const auto kind = static_cast<VplKind>(trial % kVplKinds);
     const bool glossy = rng.next_below(2) == 0;
-    const std::vector<Vpl> lights = test::random_cluster(rng, kind, 2 + rng.next_below(40));
+    std::vector<Vpl> lights = test::random_cluster(rng, kind, 2 + rng.next_below(40));
+    const float clamp = rng.next_below(3) == 0 ? 0.0f : 0.2f;
+    for (Vpl& v : lights) v.clamp2 = clamp * clamp * rng.next_float() * rng.next_float();
     const ShadePoints points = test::random_points(rng, kLanes, 1.5f, glossy);
     PointBlock block;
     block.load(points, 0);
-    const float clamp = rng.next_below(3) == 0 ? 0.0f : 0.2f * rng.next_float();
     Progress progress;
     const LightTree tree = LightTree::build(lights, {LightTree::Method::agglomerative, 4.0f, 1, trial}, progress);
     for (uint32_t n = 0; n < tree.node_count(); ++n) {
       const LightNode& node = tree.node(n);
       float bounds[kLanes];
-      light_node_bounds(node, block, clamp * clamp, bounds);
+      light_node_bounds(node, block, bounds);
       // Leaves below this node: the worst light takes all of the node's intensity, as a representative would.
       std::vector<uint32_t> stack{n};
       while (!stack.empty()) {
@@ -34,8 +35,8 @@ TEST(Bounds, AMillionRandomPairsNeverPassTheBoundOfTheirCluster) {
           continue;
         }
         for (size_t i = 0; i < kLanes; ++i) {
-          const float value = luminance(light_point(tree.lights()[below.light], node.intensity,
-                                                    {clamp * clamp, test::random_profiles()}, points.get(i)));
+          const float value = luminance(
+              light_point(tree.lights()[below.light], node.intensity, Falloff(test::random_profiles()), points.get(i)));
           ASSERT_LE(value, bounds[i]) << "trial " << trial << " node " << n << " point " << i << " kind "
                                       << static_cast<int>(kind) << " glossy " << glossy;
           tight += value > 0.9f * bounds[i];
@@ -57,7 +58,8 @@ TEST(Bounds, OfGgxAreAboutAsNearAsThoseOfBlinnLobesOfItsWidth) {
       double bound = 0, value = 0;
       for (uint32_t trial = 0; trial < 2000; ++trial) {
         Rng rng(trial, Stage::test, 21);
-        const std::vector<Vpl> lights = test::random_cluster(rng, VplKind::oriented, 6);
+        std::vector<Vpl> lights = test::random_cluster(rng, VplKind::oriented, 6);
+        for (Vpl& v : lights) v.clamp2 = 0.04f;
         ShadePoints points;
         for (size_t i = 0; i < kLanes; ++i) {
           SurfacePoint p = test::random_surface(rng, 1.5f, false);
@@ -81,12 +83,12 @@ TEST(Bounds, OfGgxAreAboutAsNearAsThoseOfBlinnLobesOfItsWidth) {
         const LightTree tree = LightTree::build(lights, {LightTree::Method::agglomerative, 4.0f, 1, trial}, progress);
         const LightNode& root = tree.node(tree.roots()[0]);
         float bounds[kLanes];
-        light_node_bounds(root, block, 0.04f, bounds);
+        light_node_bounds(root, block, bounds);
         for (size_t i = 0; i < kLanes; ++i) {
           bound += std::log(1e-6 + bounds[i]);
           float most = 0;
           for (const Vpl& light : lights)
-            most = std::max(most, luminance(light_point(light, root.intensity, 0.04f, points.get(i))));
+            most = std::max(most, luminance(light_point(light, root.intensity, {}, points.get(i))));
           value += std::log(1e-6 + most);
         }
       }
@@ -107,6 +109,7 @@ TEST(Bounds, OfSpheresAreAboutAsNearAsThoseOfPoints) {
       for (uint32_t trial = 0; trial < 3000; ++trial) {
         Rng rng(trial, Stage::test, 22);
         std::vector<Vpl> lights = test::random_cluster(rng, VplKind::oriented, 6);
+        for (Vpl& v : lights) v.clamp2 = 0.04f;
         const float radius = 0.02f + 0.2f * rng.next_float();
         for (Vpl& v : lights)
           if (spheres) v.kind = VplKind::sphere, v.radius() = radius * (1.0f + rng.next_float());
@@ -117,11 +120,11 @@ TEST(Bounds, OfSpheresAreAboutAsNearAsThoseOfPoints) {
         const LightTree tree = LightTree::build(lights, {LightTree::Method::agglomerative, 4.0f, 1, trial}, progress);
         const LightNode& root = tree.node(tree.roots()[0]);
         float bounds[kLanes];
-        light_node_bounds(root, block, 0.04f, bounds);
+        light_node_bounds(root, block, bounds);
         for (size_t i = 0; i < kLanes; ++i) {
           float most = 0;
           for (const Vpl& light : lights)
-            most = std::max(most, luminance(light_point(light, root.intensity, 0.04f, points.get(i))));
+            most = std::max(most, luminance(light_point(light, root.intensity, {}, points.get(i))));
           if (!(most > 1e-4f)) continue;
           sum += std::log(bounds[i] / most);
           ++pairs;
@@ -153,11 +156,12 @@ TEST(Bounds, DoNotDependOnTheScaleOfTheScene) {
         for (auto& axis : points.position)
           for (float& x : axis) x *= s;
       }
+      for (Vpl& v : lights) v.clamp2 = 0.01f * s * s;
       PointBlock block;
       block.load(points, 0);
       Progress progress;
       const LightTree tree = LightTree::build(lights, {LightTree::Method::agglomerative, 4.0f * s, 1, 1}, progress);
-      light_node_bounds(tree.node(tree.roots()[0]), block, 0.01f * s * s, bounds[scaled]);
+      light_node_bounds(tree.node(tree.roots()[0]), block, bounds[scaled]);
     }
     for (size_t i = 0; i < kLanes; ++i) EXPECT_NEAR(bounds[1][i], bounds[0][i], 1e-4f * bounds[0][i]) << trial;
   }

@@ -25,12 +25,13 @@ struct Lighting {
     for (size_t i = 0; i < count; ++i) {
       Vpl v = test::random_light(rng, static_cast<VplKind>(i % 4), 0.95f);
       if (v.kind == VplKind::directional) v.intensity = v.intensity * 0.1f;
+      v.clamp2 = 0.01f;
       made.push_back(v);
     }
     lights = order_lights(made);
     rows = test::random_points(rng, row_count, 0.95f, true);
     const Progress progress;
-    matrix = LightMatrix::build(*scene, lights, rows, {0.01f, test::random_profiles()}, 0.0f, progress);
+    matrix = LightMatrix::build(*scene, lights, rows, Falloff(test::random_profiles()), 0.0f, progress);
   }
 };
 
@@ -64,14 +65,14 @@ TEST(LightMatrix, EntriesAreWhatTheLightGivesToTheRow) {
   const Lighting s(600);
   const Progress progress;
   const LightMatrix open =
-      LightMatrix::build(*s.scene, s.lights, s.rows, {0.01f, test::random_profiles()}, 1.0f, progress);
+      LightMatrix::build(*s.scene, s.lights, s.rows, Falloff(test::random_profiles()), 1.0f, progress);
   size_t shadowed = 0;
   std::vector<double> sums(s.rows.size());
   for (size_t l = 0; l < s.lights.size(); ++l)
     for (size_t r = 0; r < s.rows.size(); ++r) {
       const SurfacePoint p = s.rows.get(r);
       const float free =
-          luminance(light_point(s.lights[l], s.lights[l].intensity, {0.01f, test::random_profiles()}, p));
+          luminance(light_point(s.lights[l], s.lights[l].intensity, Falloff(test::random_profiles()), p));
       const float entry = from_bfloat(s.matrix.column(l)[r]);
       // 8 bits, and single precision at grazing angles.
       EXPECT_NEAR(from_bfloat(open.column(l)[r]), free, 0.005f * free + 1e-5f);
@@ -173,14 +174,14 @@ TEST(ColumnClusters, ColumnsThatDifferByAFactorAreOneCluster) {
   // Lights of one place at two powers: no cost, no split.
   Lighting s(4);
   Vpl v;
-  v.position = {0, -0.5f, 0.8f};
+  v.position = {0, -0.5f, 0.8f}, v.clamp2 = 0.01f;
   std::vector<Vpl> lights;
   for (int i = 0; i < 1000; ++i) {
     v.intensity = Rgb{1, 1, 1} * (i % 2 == 0 ? 1.0f : 4.0f);  // exact in 8 bits
     lights.push_back(v);
   }
   const Progress progress;
-  const LightMatrix matrix = LightMatrix::build(*s.scene, lights, s.rows, 0.01f, 0.0f, progress);
+  const LightMatrix matrix = LightMatrix::build(*s.scene, lights, s.rows, {}, 0.0f, progress);
   const std::vector<float> ones(s.rows.size(), 1.0f);
   ColumnClusters clusters(matrix, ones);
   ASSERT_EQ(clusters.clusters().size(), 1u);

@@ -10,13 +10,13 @@ TEST(LightKernel, EqualsPlainArithmeticForEveryKindOfLightAndMaterial) {
     for (uint32_t trial = 0; trial < 400; ++trial) {
       Rng rng(trial, Stage::test, glossy);
       const ShadePoints points = test::random_points(rng, 1 + rng.next_below(kMaxLit), 1.0f, glossy);
-      const Vpl light = test::random_light(rng, static_cast<VplKind>(trial % kVplKinds), 1.5f);
-      const float clamp2 = 0.01f;
+      Vpl light = test::random_light(rng, static_cast<VplKind>(trial % kVplKinds), 1.5f);
+      light.clamp2 = 0.01f;
       auto lit = std::make_unique<LitPoints>();
-      light_points(light, light.intensity, {clamp2, test::random_profiles()}, points, 0, points.size(), *lit);
+      light_points(light, light.intensity, Falloff(test::random_profiles()), points, 0, points.size(), *lit);
       size_t next = 0;
       for (size_t i = 0; i < points.size(); ++i) {
-        const Rgb expected = light_point(light, light.intensity, {clamp2, test::random_profiles()}, points.get(i));
+        const Rgb expected = light_point(light, light.intensity, Falloff(test::random_profiles()), points.get(i));
         Rgb got{};
         if (next < lit->count && lit->index[next] == i) {
           got = {lit->r[next], lit->g[next], lit->b[next]};
@@ -26,7 +26,7 @@ TEST(LightKernel, EqualsPlainArithmeticForEveryKindOfLightAndMaterial) {
         // GGX's lobe is 3000 high at the sharpest, and rounding of the light's direction turns it by 1e-6 of its width.
         // exp(n log x) against pow: relative error grows with n (up to 1000) times half an ulp of the logarithm; near
         // the horizon cosines cancel, so the largest possible value sets the absolute scale.
-        const float scale = max_component(light.intensity) / clamp2;
+        const float scale = max_component(light.intensity) / light.clamp2;
         for (int k = 0; k < 3; ++k) EXPECT_NEAR(got[k], expected[k], 1e-3f * expected[k] + 1e-6f * scale);
       }
       EXPECT_EQ(next, lit->count) << "indices rise, and no point beyond the count is lit";
@@ -43,7 +43,8 @@ TEST(LightKernel, LightOnThePointItselfStaysFinite) {
   light.intensity = {1, 1, 1};
   for (const float clamp2 : {0.0f, 0.25f}) {
     LitPoints lit;
-    light_points(light, light.intensity, {clamp2, test::random_profiles()}, points, 0, points.size(), lit);
+    light.clamp2 = clamp2;
+    light_points(light, light.intensity, Falloff(test::random_profiles()), points, 0, points.size(), lit);
     for (size_t i = 0; i < lit.count; ++i) EXPECT_TRUE(std::isfinite(lit.r[i]));
   }
 }
@@ -78,14 +79,14 @@ TEST(LightKernel, MeanOfAClusterShinesAsItsLightsTogether) {
 
       const ShadePoints points = test::random_points(rng, 64, 1.0f, trial % 2 == 0);
       Vpl light = test::random_light(rng, VplKind::oriented, 1.5f);
-      light.normal = mean;
+      light.normal = mean, light.clamp2 = 0.01f;
       Vpl omni = light;
       omni.kind = VplKind::omni;
       LitPoints lit;
-      light_points(light, light.intensity, 0.01f, points, 0, points.size(), lit, nullptr, &s);
+      light_points(light, light.intensity, {}, points, 0, points.size(), lit, nullptr, &s);
       for (size_t i = 0; i < lit.count; ++i) {
         const SurfacePoint point = points.get(lit.index[i]);
-        const Rgb expected = light_point(omni, light.intensity, 0.01f, point) *
+        const Rgb expected = light_point(omni, light.intensity, {}, point) *
                              mean_cosine(mean, s, normalize(light.position - point.position));
         EXPECT_NEAR(lit.g[i], expected.y, 2e-3f * expected.y + 1e-4f * max_component(light.intensity));
       }

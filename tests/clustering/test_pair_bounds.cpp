@@ -38,7 +38,9 @@ TEST(PairBounds, AMillionRandomPairsNeverPassTheBoundOfTheirClusters) {
   for (uint32_t trial = 0; pairs < 1200000; ++trial) {
     Rng rng(trial, Stage::test, 11);
     const auto kind = static_cast<VplKind>(trial % kVplKinds);
-    const std::vector<Vpl> lights = test::random_cluster(rng, kind, 2 + rng.next_below(24));
+    std::vector<Vpl> lights = test::random_cluster(rng, kind, 2 + rng.next_below(24));
+    const float clamp = rng.next_below(3) == 0 ? 0.0f : 0.2f;
+    for (Vpl& v : lights) v.clamp2 = clamp * clamp * rng.next_float() * rng.next_float();
     const size_t used = 1 + rng.next_below(kLanes);
     const bool glossy = rng.next_below(2) == 0;
     PointNodes nodes;
@@ -49,14 +51,13 @@ TEST(PairBounds, AMillionRandomPairsNeverPassTheBoundOfTheirClusters) {
     }
     if (used < kLanes) nodes.pad(used);
     ASSERT_EQ(nodes.used, (1u << used) - 1);
-    const float clamp = rng.next_below(3) == 0 ? 0.0f : 0.2f * rng.next_float(), clamp2 = clamp * clamp;
     Progress progress;
     const LightTree tree = LightTree::build(lights, {LightTree::Method::agglomerative, 4.0f, 1, trial}, progress);
     for (uint32_t n = 0; n < tree.node_count(); ++n) {
       const LightNode& node = tree.node(n);
       float bounds[kLanes], distances2[kLanes];
-      pair_bounds(node, nodes, clamp2, bounds);
-      pair_distances2(node, nodes, clamp2, distances2);
+      pair_bounds(node, nodes, bounds);
+      pair_distances2(node, nodes, distances2);
       std::vector<uint32_t> stack{n};
       while (!stack.empty()) {
         const LightNode& below = tree.node(stack.back());
@@ -71,12 +72,13 @@ TEST(PairBounds, AMillionRandomPairsNeverPassTheBoundOfTheirClusters) {
           for (size_t i = 0; i < clusters[lane].size(); ++i) {
             const SurfacePoint p = clusters[lane].get(i);
             // The worst light takes all of the node's intensity, as a representative would.
-            const float value = luminance(light_point(light, node.intensity, {clamp2, test::random_profiles()}, p));
+            const float value = luminance(light_point(light, node.intensity, Falloff(test::random_profiles()), p));
             ASSERT_LE(value, bounds[lane]) << "trial " << trial << " node " << n << " lane " << lane << " kind "
                                            << static_cast<int>(kind) << " glossy " << glossy;
             if (kind != VplKind::directional) {
+              const float least2 = kind == VplKind::sphere ? light.radius() * light.radius() : light.clamp2;
               // Rounding of positions of up to 4 units.
-              ASSERT_LE(distances2[lane], std::max(clamp2, length2(light.position - p.position)) + 1e-5f);
+              ASSERT_LE(distances2[lane], std::max(least2, length2(light.position - p.position)) + 1e-5f);
             }
             tight += value > 0.8f * bounds[lane];
             zero_bounds += bounds[lane] == 0.0f;
@@ -101,11 +103,12 @@ TEST(PairBounds, OfSinglePointsAreThoseOfTheLightNode) {
     PointBlock block;
     block.load(points, 0);
     Progress progress;
-    const LightTree tree = LightTree::build(test::random_cluster(rng, kind, 9),
-                                            {LightTree::Method::agglomerative, 4.0f, 1, trial}, progress);
+    std::vector<Vpl> lights = test::random_cluster(rng, kind, 9);
+    for (Vpl& v : lights) v.clamp2 = 1.0f;
+    const LightTree tree = LightTree::build(lights, {LightTree::Method::agglomerative, 4.0f, 1, trial}, progress);
     float pair[kLanes], single[kLanes];
-    pair_bounds(tree.node(tree.roots()[0]), nodes, 1.0f, pair);
-    light_node_bounds(tree.node(tree.roots()[0]), block, 1.0f, single);
+    pair_bounds(tree.node(tree.roots()[0]), nodes, pair);
+    light_node_bounds(tree.node(tree.roots()[0]), block, single);
     // The cone of one direction is opened by 1e-5 of cosine against rounding, 0.0045 radians: of nine lights of
     // intensity 1 at distance 1, on surfaces of at most 0.3.
     for (size_t i = 0; i < kLanes; ++i) {

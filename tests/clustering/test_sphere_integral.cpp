@@ -93,7 +93,7 @@ TEST(SphereIntegral, IsThatOfBruteForceForEveryMaterialInsideAndOutside) {
         // In units of the cone's own size, so that no near sphere outweighs the others.
         const double unit = cone_of(light, p.position).geometry;
         const double truth = brute_force(light, p) / unit;
-        const double value = static_cast<double>(light_point(light, light.intensity, 0.0f, p).y) / unit;
+        const double value = static_cast<double>(light_point(light, light.intensity, {}, p).y) / unit;
         error2 += (value - truth) * (value - truth), difference += value - truth, sum += truth;
       }
       const double rms = std::sqrt(error2 / kTrials) / (sum / kTrials), bias = difference / sum;
@@ -117,13 +117,13 @@ TEST(SphereIntegral, OfADiffusePointAboveAllOfASphereIsTheClosedForm) {
   for (const float r : {0.01f, 0.3f, 0.9f, 1.0f}) {
     light.position = {0, 0, 1}, light.radius() = r;
     const double c = std::sqrt(1 - double{r} * double{r});
-    EXPECT_NEAR(light_point(light, light.intensity, 0.0f, p).x, 2 * (1 - c * c * c) / (3 * double{r} * double{r}),
+    EXPECT_NEAR(light_point(light, light.intensity, {}, p).x, 2 * (1 - c * c * c) / (3 * double{r} * double{r}),
                 1e-4 / (1e-3 + double{r} * double{r}) * 1e-2 + 1e-5)
         << r;
   }
   // At the centre all directions count; those below either horizon give nothing: half of ∫ cos² over the sphere.
   light.position = p.position, light.radius() = 0.5f;
-  EXPECT_NEAR(light_point(light, light.intensity, 0.0f, p).x, 2.0 / (3 * 0.25), 0.03 * 2.0 / (3 * 0.25));
+  EXPECT_NEAR(light_point(light, light.intensity, {}, p).x, 2.0 / (3 * 0.25), 0.03 * 2.0 / (3 * 0.25));
 }
 
 TEST(SphereIntegral, TendsToThePointLightAsTheSphereShrinks) {
@@ -134,10 +134,10 @@ TEST(SphereIntegral, TendsToThePointLightAsTheSphereShrinks) {
     Vpl point = test::random_light(rng, VplKind::oriented, 1.0f), sphere = point;
     const float d = length(point.position - p.position);
     sphere.kind = VplKind::sphere;
-    const Rgb expected = light_point(point, point.intensity, 0.0f, p);
+    const Rgb expected = light_point(point, point.intensity, {}, p);
     for (const float share : {2e-3f, 1e-3f, 3e-4f, 1e-4f, 1e-5f, 1e-7f}) {
       sphere.radius() = share * d;
-      const Rgb got = light_point(sphere, sphere.intensity, 0.0f, p);
+      const Rgb got = light_point(sphere, sphere.intensity, {}, p);
       // Over the cone the sharpest lobe (exponent 1000, α 0.01) varies by some share/0.01 to either side of its mean,
       // and cosines by `share` near the horizon.
       const float slack = (0.01f + 4.0f * share / 0.01f) * expected.y +
@@ -158,7 +158,7 @@ TEST(SphereIntegral, IsContinuousThroughTheSurfaceOfTheSphere) {
     float value[2];
     for (const int side : {0, 1}) {
       light.radius() = d * (side == 0 ? 0.999999f : 1.000001f);
-      value[side] = light_point(light, light.intensity, 0.0f, p).y;
+      value[side] = light_point(light, light.intensity, {}, p).y;
     }
     // The cone's angle grows with the root of the distance to the surface: √(2e-6) to either side of π/2.
     EXPECT_NEAR(value[0], value[1], 0.03f * std::max(value[0], 0.1f * light.intensity.y * p.diffuse.y / (d * d)));
@@ -171,10 +171,10 @@ TEST(SphereIntegral, IsTheSameInBlocksOfLightsAndOneByOne) {
     const ShadePoints points = test::random_points(rng, 48, 1.0f, trial % 3 != 0);
     const std::vector<Vpl> lights = test::random_cluster(rng, VplKind::sphere, 9);
     BlockSums sums;
-    light_block(lights, 1.0f, 0.0f, points, 0, points.size(), false, sums);
+    light_block(lights, 1.0f, {}, points, 0, points.size(), false, sums);
     for (size_t i = 0; i < points.size(); ++i) {
       Rgb sum{};
-      for (const Vpl& light : lights) sum += light_point(light, light.intensity, 0.0f, points.get(i));
+      for (const Vpl& light : lights) sum += light_point(light, light.intensity, {}, points.get(i));
       EXPECT_NEAR(sums.g[i], sum.y, 1e-3f * sum.y + 1e-6f);
     }
   }
@@ -190,7 +190,7 @@ TEST(SphereIntegral, StaysFiniteWhereverTheLightLies) {
       if (at % 2 == 0) light.position = points.position_at(at);
       if (at % 4 == 1) light.position = points.position_at(at) + points.get(at).mirror * 0.5f;  // the lobe's own axis
       LitPoints lit;
-      light_points(light, light.intensity, 0.0f, points, 0, points.size(), lit);
+      light_points(light, light.intensity, {}, points, 0, points.size(), lit);
       // A radius whose fourth power leaves the range of floats may overflow, and nothing else.
       for (size_t i = 0; i < lit.count && radius > 1e-10f; ++i)
         EXPECT_TRUE(std::isfinite(lit.r[i]) && lit.r[i] >= 0.0f) << radius << " " << at;

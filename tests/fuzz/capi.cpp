@@ -13,6 +13,7 @@
 #include <mutex>
 #include <thread>
 
+#include "lumicut/lumicut_lights.h"
 #include "lumicut/lumicut_state.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/plugin/box_scene.h"
@@ -438,8 +439,21 @@ class Session {
     light.intensity[0] = light.intensity[1] = light.intensity[2] = 1;
     light.cos_outer = 0.5f;
     const auto* lights = keep(changed(std::vector<lumicut_vpl>(in_.ConsumeIntegralInRange<size_t>(1, 4), light)));
-    return lumicut_integrator_set_lights(handle<lumicut_integrator>(kIntegrator), rarely() ? nullptr : lights,
-                                         in_.ConsumeIntegralInRange<uint64_t>(0, 1));
+    const auto integrator = handle<lumicut_integrator>(kIntegrator);
+    if (in_.ConsumeBool())
+      return lumicut_integrator_set_lights(integrator, rarely() ? nullptr : lights,
+                                           in_.ConsumeIntegralInRange<uint64_t>(0, 1));
+    lumicut_vpl_origin origin{};
+    origin.source = in_.ConsumeIntegralInRange<uint32_t>(0, 2);
+    origin.offset = 0.001f, origin.area = origin.source == LUMICUT_SOURCE_AREA ? 0.1f : 0.0f;
+    const auto* origins = keep(changed(std::vector<lumicut_vpl_origin>(4, origin)));
+    auto usual = make<lumicut_vpl_set>();
+    usual.count = 1, usual.emitter_samples = 1;
+    return lumicut::api::lights_extension().set(integrator, descriptors(usual, 1, [&](lumicut_vpl_set& set) {
+                                                  cap(set.count, 1);
+                                                  set.lights = rarely() ? nullptr : lights;
+                                                  set.origins = rarely() ? nullptr : origins;
+                                                }));
   }
 
   lumicut_result prepare() {
@@ -455,6 +469,9 @@ class Session {
         lumicut_integrator_get_lights(handle<lumicut_integrator>(kIntegrator), rarely() ? nullptr : &lights, &count);
     float sum = 0;
     for (uint64_t i = 0; i < count; ++i) sum += lights[i].intensity[0];
+    auto set = make<lumicut_vpl_set>();
+    if (lumicut::api::lights_extension().get(handle<lumicut_integrator>(kIntegrator), &set) == LUMICUT_OK)
+      for (uint64_t i = 0; i < set.count; ++i) sum += set.origins[i].offset;
     sum_ = sum_ + sum;
     return result;
   }

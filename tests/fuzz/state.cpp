@@ -7,7 +7,7 @@ using namespace lumicut;
 
 namespace {
 
-constexpr fuzz::Layout kLayout = {64, 24, 16};  // plugin/capi_state.cpp
+constexpr fuzz::Layout kLayout = {72, 24, 16};  // plugin/capi_state.cpp
 
 struct Subject {
   const lumicut_state_extension& extension =

@@ -16,13 +16,17 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const api::Integrator integrator(device, "exhaustive");
   try {
     const auto lights = io::read_vpls(folder.write("lights.vpl", fuzz::text_of(data, size)));
-    io::write_vpls(folder / "again.vpl", lights.data(), lights.size());
+    io::write_vpls(folder / "again.vpl", lights);
     const auto again = io::read_vpls(folder / "again.vpl");
-    if (again.size() != lights.size() ||
-        (!lights.empty() && std::memcmp(again.data(), lights.data(), lights.size() * sizeof(lights[0])) != 0))
+    const auto same = [](const auto& a, const auto& b) {
+      return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(a[0])) == 0);
+    };
+    if (!same(again.lights, lights.lights) || !same(again.origins, lights.origins) ||
+        again.light_paths != lights.light_paths || again.emitter_samples != lights.emitter_samples)
       fuzz::finding("what was written does not read back the same");
-    if (lumicut_integrator_set_lights(integrator.get(), lights.data(), lights.size()) == LUMICUT_INTERNAL)
-      fuzz::finding(lumicut_last_error());
+    api::set_vpls(integrator.get(), lights);
+  } catch (const api::Exception& error) {
+    if (error.code() == LUMICUT_INTERNAL) fuzz::finding(error.what());
   } catch (const io::FileError&) {
   }
   return 0;

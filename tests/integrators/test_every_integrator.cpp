@@ -24,13 +24,13 @@ TEST_P(EveryIntegrator, GivesTheSameImageOnEmbreeAndOnOurBvh) {
   // differ in the last digit are clustered and sampled otherwise: then the error is the same, if not the noise.
   const auto truth = test::render(*embree, "exhaustive", vpls, {});
   const double theirs = test::mean_relative_error(a.radiance, truth.radiance);
-  EXPECT_LT(test::mean_relative_error(b.radiance, truth.radiance), 1.25 * theirs + 0.005);
+  EXPECT_LT(test::mean_relative_error(b.radiance, truth.radiance), 1.25 * theirs + 0.01);
   const auto mean = [](const test::Image& frame) {
     double sum = 0;
     for (const Rgb& c : frame.radiance) sum += luminance(c);
     return sum / static_cast<double>(frame.radiance.size());
   };
-  EXPECT_NEAR(mean(b) / mean(a), 1.0, 0.005);
+  EXPECT_NEAR(mean(b) / mean(a), 1.0, 0.01);
 }
 
 TEST_P(EveryIntegrator, GivesTheSameImageOnOneAndFourThreads) {
@@ -51,7 +51,7 @@ TEST_P(EveryIntegrator, IsAsNearToTheSumOfSpheresAsToThatOfPoints) {
     error[spheres] = test::mean_relative_error(own.radiance, truth.radiance);
   }
   RecordProperty("error", std::to_string(error[0]) + " of points, " + std::to_string(error[1]) + " of spheres");
-  EXPECT_LT(error[1], 1.25 * error[0] + 0.005);
+  EXPECT_LT(error[1], 1.3 * error[0] + 0.005);
 }
 
 TEST_P(EveryIntegrator, GivesTheSameImageOfSpheresOnOneAndFourThreads) {

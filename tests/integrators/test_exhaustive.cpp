@@ -103,7 +103,7 @@ TEST(Exhaustive, ClosedWhiteBoxHasTheRadianceOfItsGeometricSeries) {
     const int axis = i % 3, side = i / 3 % 2;
     p[axis] = side ? 1.0f : -1.0f;
     n[axis] = side ? -1.0f : 1.0f;
-    points.push(scene->bsdf({p, n, n, n, scene->epsilon(), static_cast<uint32_t>(i)}, 0, {}).layers()[0]);
+    points.push(scene->bsdf({p, n, n, n, 1e-5f, static_cast<uint32_t>(i)}, 0, {}).layers()[0]);
   }
   points.finish();
   const auto integrator = find_integrator("exhaustive")->create();
@@ -149,7 +149,7 @@ TEST(Exhaustive, StopsWhenCancelled) {
   integrator->prepare(*scene, vpls, Params(all_params(*find_integrator("exhaustive"))), {progress, stats});
   Rng rng(1, Stage::test);
   ShadePoints points;
-  points.push(scene->bsdf({{0, 0, -1}, {0, 0, 1}, {0, 0, 1}, {0, 0, 1}, scene->epsilon()}, 0, {}).layers()[0]);
+  points.push(scene->bsdf({{0, 0, -1}, {0, 0, 1}, {0, 0, 1}, {0, 0, 1}, 1e-5f}, 0, {}).layers()[0]);
   points.finish();
   std::vector<Rgb> radiance(1);
   progress.cancel();

@@ -152,6 +152,7 @@ TEST(LightSlice, BeatsOneClusteringForAllPointsWhereEachSeesLittle) {
       Vpl v;
       v.position = Vec3f{x, 0, 0} + test::random_point(rng, 0.9f);
       v.intensity = {1, 1, 1};
+      v.clamp2 = 0.25f;
       vpls.lights.push_back(v);
     }
     for (int i = 0; i < 256; ++i) {
@@ -167,7 +168,6 @@ TEST(LightSlice, BeatsOneClusteringForAllPointsWhereEachSeesLittle) {
   scene.commit(progress);
   const auto shade = [&](const char* id, const test::Settings& settings) {
     Params params(all_params(*find_integrator(id)));
-    params.set("clamp_distance", "0.5");
     for (const auto& [name, value] : settings) params.set(name, value);
     Stats stats;
     const auto integrator = find_integrator(id)->create();

@@ -66,8 +66,7 @@ TEST(MultidimensionalLightcuts, ImageDoesNotDependOnTheScaleOfTheScene) {
   const auto unit = test::render(*unit_scene, kId, vpls, {}, {.samples = 4}).radiance;
   for (float scale : {1.0f / 1024, 1024.0f}) {
     const auto scene = test::make_room(scale);
-    VplSet scaled = vpls;
-    for (Vpl& v : scaled.lights) v.position = v.position * scale, v.intensity = v.intensity * (scale * scale);
+    const VplSet scaled = test::scaled(vpls, scale);
     EXPECT_LT(test::rmse_over_mean(test::render(*scene, kId, scaled, {}, {.samples = 4}).radiance, unit), 1e-3)
         << scale;
   }

@@ -61,17 +61,18 @@ TEST(BlockKernel, EqualsThePlainSumForEveryKindAndCount) {
         v.position = test::random_point(rng, 2.0f);
         if (v.kind != VplKind::omni) v.normal = test::random_direction(rng);
         v.intensity = {rng.next_float(), rng.next_float(), rng.next_float()};
+        v.clamp2 = 0.01f;
         if (v.kind == VplKind::spot)
           v.cos_outer() = -0.5f, v.blend_cosine = i % 3 == 0 ? 0.0f : 0.4f, v.spot_cosine = i % 3 == 1 ? 1.0f : 0.0f,
           v.spread_tan = i % 3 == 2 ? 0.7f : 0.0f;
         lights.push_back(v);
       }
-      light_block(lights, 0.5f, 0.01f, points, 16, count, false, sums);
-      light_block({lights.data(), 2}, 0.25f, 0.01f, points, 16, count, true, sums);
+      light_block(lights, 0.5f, {}, points, 16, count, false, sums);
+      light_block({lights.data(), 2}, 0.25f, {}, points, 16, count, true, sums);
       for (size_t i = 0; i < count; ++i) {
         Rgb expected;
         for (size_t l = 0; l < lights.size(); ++l)
-          expected += light_point(lights[l], lights[l].intensity, 0.01f, plain[16 + i]) * (l < 2 ? 0.75f : 0.5f);
+          expected += light_point(lights[l], lights[l].intensity, {}, plain[16 + i]) * (l < 2 ? 0.75f : 0.5f);
         // Log and exp of the lobe: a few units in the last place, times the exponent.
         EXPECT_NEAR(sums.r[i], expected.x, 1e-4f * expected.x + 1e-6f);
         EXPECT_NEAR(sums.g[i], expected.y, 1e-4f * expected.y + 1e-6f);

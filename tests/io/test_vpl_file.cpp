@@ -19,34 +19,71 @@ lumicut_vpl oriented(float x) {
 
 std::string bytes_of(const auto& value) { return {reinterpret_cast<const char*>(&value), sizeof(value)}; }
 
+// Of version 1, whose records are 64 bytes.
 std::string own_header(uint64_t count, uint32_t version = 1, uint32_t record = 64) {
   return "LUMIVPL\n" + bytes_of(version) + bytes_of(record) + bytes_of(count) + bytes_of(uint64_t{0});
 }
 
-TEST(VplFile, LightsComeBackBitForBit) {
-  const TemporaryFolder folder;
-  std::vector<lumicut_vpl> lights(100);
+// Of version 2: light paths and samples of emitters, then records with their origins.
+std::string header2(uint64_t count, uint64_t emitter_samples = 0) {
+  return own_header(count, 2, 76) + bytes_of(emitter_samples);
+}
+
+template <typename T>
+bool same_bytes(const std::vector<T>& a, const std::vector<T>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
+}
+
+api::VplSet hundred() {
+  api::VplSet set;
+  set.lights.resize(100);
   for (int i = 0; i < 100; ++i) {
-    auto& l = lights[static_cast<size_t>(i)] = oriented(0.1f * static_cast<float>(i));
+    auto& l = set.lights[static_cast<size_t>(i)] = oriented(0.1f * static_cast<float>(i));
     const float a = static_cast<float>(i);
     l.normal[0] = std::sin(a), l.normal[1] = std::cos(a);
     l.kind = static_cast<uint32_t>(i % 5);
     l.group = 7;
     l.cos_outer = 0.5f, l.blend = 0.1f, l.spot_cosine = 1, l.spread_tan = 2;
   }
-  write_vpls(folder / "a.vpl", lights.data(), lights.size());
+  return set;
+}
+
+TEST(VplFile, LightsComeBackBitForBit) {
+  const TemporaryFolder folder;
+  api::VplSet set = hundred();
+  for (uint32_t i = 0; i < 100; ++i)
+    set.origins.push_back({i % 3, 1e-4f * static_cast<float>(i), i % 3 == LUMICUT_SOURCE_AREA ? 0.3f : 0.0f});
+  set.light_paths = 1234, set.emitter_samples = 40;
+  write_vpls(folder / "a.vpl", set);
   const auto read = read_vpls(folder / "a.vpl");
-  ASSERT_EQ(read.size(), lights.size());
-  EXPECT_EQ(std::memcmp(read.data(), lights.data(), 64 * lights.size()), 0);
-  EXPECT_EQ(std::filesystem::file_size(folder / "a.vpl"), 32u + 6400u);
-  write_vpls(folder / "none.vpl", nullptr, 0);
-  EXPECT_TRUE(read_vpls(folder / "none.vpl").empty());
+  EXPECT_TRUE(same_bytes(read.lights, set.lights));
+  EXPECT_TRUE(same_bytes(read.origins, set.origins));
+  EXPECT_EQ(read.light_paths, 1234u);
+  EXPECT_EQ(read.emitter_samples, 40u);
+  EXPECT_EQ(std::filesystem::file_size(folder / "a.vpl"), 40u + 7600u);
+  write_vpls(folder / "none.vpl", {});
+  EXPECT_TRUE(read_vpls(folder / "none.vpl").lights.empty());
+}
+
+TEST(VplFile, OfVersion1AndLightsWithoutOriginsNothingIsKnown) {
+  const TemporaryFolder folder;
+  const api::VplSet set = hundred();
+  std::string first = own_header(100);
+  for (const auto& light : set.lights) first += bytes_of(light);
+  folder.write("1.vpl", first);
+  write_vpls(folder / "2.vpl", set);
+  for (const char* name : {"1.vpl", "2.vpl"}) {
+    const auto read = read_vpls(folder / name);
+    EXPECT_TRUE(same_bytes(read.lights, set.lights)) << name;
+    EXPECT_TRUE(same_bytes(read.origins, std::vector<lumicut_vpl_origin>(100))) << name;
+    EXPECT_EQ(read.emitter_samples, 0u);
+  }
 }
 
 TEST(VplFile, ThePeersNormalsAreTurned) {
   const TemporaryFolder folder;
   const float record[9] = {1, 2, 3, 0, -1, 0, 4, 5, 6};
-  const auto lights = read_vpls(folder.write("peer.vpl", bytes_of(uint64_t{1}) + bytes_of(record)));
+  const auto lights = read_vpls(folder.write("peer.vpl", bytes_of(uint64_t{1}) + bytes_of(record))).lights;
   ASSERT_EQ(lights.size(), 1u);
   EXPECT_EQ(lights[0].kind, uint32_t{LUMICUT_VPL_ORIENTED});
   EXPECT_EQ(lights[0].normal[1], 1.0f);
@@ -62,8 +99,11 @@ TEST(VplFile, WrongFilesAreNamedWithRecordAndField) {
   expect_in(error(""), {"bad.vpl", "no VPL file"});
   expect_in(error("hello world, this is no light"), {"no VPL file"});
   expect_in(error("LUMIVPL\n"), {"ends within its header"});
-  expect_in(error(own_header(0, 2)), {"version is 2"});
+  expect_in(error(own_header(0, 0)), {"version is 0"});
+  expect_in(error(own_header(0, 3)), {"version is 3"});
   expect_in(error(own_header(0, 1, 60)), {"record size is 60"});
+  expect_in(error(own_header(0, 2, 64)), {"record size is 64", "76"});
+  expect_in(error(own_header(0, 2, 76)), {"ends within its header"});
   expect_in(error(own_header(2) + bytes_of(oriented(1))), {"says 2 lights", "64 bytes"});
   expect_in(error(own_header(UINT64_MAX) + bytes_of(oriented(1))), {"18446744073709551615"});
   expect_in(error(own_header(1) + bytes_of(oriented(1)).substr(0, 40)), {"40 bytes"});
@@ -82,11 +122,34 @@ TEST(VplFile, WrongFilesAreNamedWithRecordAndField) {
   expect_in(light([](auto& l) { l.spread_tan = NAN; }), {"light 1", "spot"});
 }
 
+TEST(VplFile, WrongOriginsAreNamedWithRecordAndField) {
+  const TemporaryFolder folder;
+  const auto error = [&](const std::string& bytes) {
+    return error_of([&] { read_vpls(folder.write("bad.vpl", bytes)); });
+  };
+  const std::string light = bytes_of(oriented(0)), origin = bytes_of(lumicut_vpl_origin{LUMICUT_SOURCE_AREA, 0.1f, 2});
+  EXPECT_EQ(read_vpls(folder.write("good.vpl", header2(1, 1) + light + origin)).origins[0].area, 2);
+  expect_in(error(header2(2, 2) + light + origin), {"bad.vpl", "says 2 lights", "76 bytes"});
+  expect_in(error(header2(1, 1) + light + origin.substr(0, 8)), {"says 1 lights", "72 bytes"});
+  expect_in(error(header2(1, 0) + light + origin), {"0 samples of emitters", "1 lights"});
+  const auto spoilt = [&](auto change) {
+    lumicut_vpl_origin bad{};
+    change(bad);
+    return error(header2(2, 1) + light + origin + light + bytes_of(bad));
+  };
+  expect_in(spoilt([](auto& o) { o.source = 3; }), {"bad.vpl", "light 1", "source is 3"});
+  expect_in(spoilt([](auto& o) { o.offset = NAN; }), {"light 1", "offset is nan"});
+  expect_in(spoilt([](auto& o) { o.offset = -1; }), {"light 1", "offset is -1"});
+  expect_in(spoilt([](auto& o) { o.area = 1; }), {"light 1", "area is 1", "0 for its source"});
+  expect_in(spoilt([](auto& o) { o.source = LUMICUT_SOURCE_AREA; }), {"light 1", "area is 0", "above 0"});
+  expect_in(spoilt([](auto& o) { o.source = LUMICUT_SOURCE_AREA, o.area = INFINITY; }), {"light 1", "area is inf"});
+}
+
 TEST(VplFile, NormalsAreBroughtToLengthOne) {
   const TemporaryFolder folder;
   lumicut_vpl light = oriented(0);
   light.normal[1] = 5;
-  EXPECT_EQ(read_vpls(folder.write("a.vpl", own_header(1) + bytes_of(light)))[0].normal[1], 1.0f);
+  EXPECT_EQ(read_vpls(folder.write("a.vpl", own_header(1) + bytes_of(light))).lights[0].normal[1], 1.0f);
 }
 
 }  // namespace

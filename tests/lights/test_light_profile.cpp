@@ -93,7 +93,7 @@ TEST(LightProfile, PowerOfALampGoesRoundThroughItsPaths) {
   EXPECT_NEAR(flux / emitters.power(), 1.0, 0.01);
   ASSERT_EQ(emitters.delta_lights().size(), 1u) << "one VPL stands for it, exactly";
   const Vpl& v = emitters.delta_lights()[0];
-  const Falloff falloff(0.0f, scene->profiles());
+  const Falloff falloff(scene->profiles());
   for (int i = 0; i < 1000; ++i) {
     Rng rng(i, Stage::test, 1);
     const Vec3f d = test::random_direction(rng);
@@ -128,7 +128,7 @@ TEST(LightProfiles, GoWithTheSceneAndTheLightsMadeOfIt) {
   auto vpls = std::make_unique<VplSet>(trace_vpls(*scene, {.count = 10}, progress));
   scene.reset();
   ASSERT_FALSE(held.expired());
-  EXPECT_GT(Falloff(0.0f, vpls->profiles).of_spot(vpls->lights[0], vpls->lights[0].normal), 0.0f);
+  EXPECT_GT(Falloff(vpls->profiles).of_spot(vpls->lights[0], vpls->lights[0].normal), 0.0f);
   vpls.reset();
   EXPECT_TRUE(held.expired());
 }

@@ -21,7 +21,7 @@ TEST(SphereRadii, AreTheDistanceToTheTenthNeighbour) {
   std::vector<Vec3f> places;
   for (int i = 0; i < 3000; ++i) places.push_back(test::random_point(rng, 1.0f));
   std::vector<Vpl> lights = oriented(places);
-  make_spheres(lights, 0.5f, 10.0f);  // held between 0.01 and 1: none of these distances
+  make_spheres(lights, 0.5f, 10.0f);  // at least 0.01: none of these distances
   for (size_t i = 0; i < places.size(); i += 37) {
     std::vector<float> d;
     for (const Vec3f& p : places) d.push_back(length(p - places[i]));
@@ -37,13 +37,27 @@ TEST(SphereRadii, OfLightsInOnePlaceAreTheLeast) {
   for (const Vpl& v : lights) EXPECT_EQ(v.radius(), kLeastSphere * 5.0f);
 }
 
-TEST(SphereRadii, OfFewerThanElevenLightsAreTheLargest) {
-  for (const size_t n : {0, 1, 10}) {
-    std::vector<Vpl> lights = oriented(std::vector<Vec3f>(n, Vec3f{}));
-    for (size_t i = 0; i < n; ++i) lights[i].position.x = 0.01f * static_cast<float>(i);
-    make_spheres(lights, 2.0f, 5.0f);
-    for (const Vpl& v : lights) EXPECT_EQ(v.radius(), 2.0f * kLargestSphere * 5.0f);
-  }
+// n lights in a disk of radius r: ten in one of r √(10/n).
+TEST(SphereRadii, OfFewerThanElevenLightsAreAsIfMoreLayAsDenselyFurtherOut) {
+  std::vector<Vpl> none;
+  make_spheres(none, 2.0f, 5.0f);
+  std::vector<Vpl> one = oriented({{1, 2, 3}});
+  make_spheres(one, 2.0f, 5.0f);
+  EXPECT_EQ(one[0].radius(), 2.0f * kLonelySphere * 5.0f);
+  std::vector<Vpl> few = oriented({{0, 0, 0}, {1, 0, 0}, {0, 2, 0}});
+  make_spheres(few, 2.0f, 5.0f);
+  EXPECT_FLOAT_EQ(few[0].radius(), 2.0f * 2.0f * std::sqrt(5.0f));
+}
+
+TEST(SphereRadii, DoNotFeelADistantLight) {
+  Rng rng(1, Stage::test);
+  std::vector<Vec3f> places;
+  for (int i = 0; i < 500; ++i) places.push_back(test::random_point(rng, 1.0f));
+  std::vector<Vpl> near = oriented(places);
+  places.push_back({1e5f, 0, 0});
+  std::vector<Vpl> with_far = oriented(places);
+  make_spheres(near, 1.0f, 1.0f), make_spheres(with_far, 1.0f, 1.0f);
+  for (size_t i = 0; i < near.size(); ++i) EXPECT_EQ(near[i].radius(), with_far[i].radius());
 }
 
 }  // namespace lumicut

@@ -29,6 +29,22 @@ std::unique_ptr<Scene> closed_box(float albedo) {
 
 }  // namespace
 
+// Where the number of paths followed from the lights that they brought, few lights gave 1 + spread²/paths of all: here 5 %.
+TEST(TraceVpls, FewLightsMeanNoMoreThanMany) {
+  const auto scene = closed_box(0.5f);
+  Progress progress;
+  double flux = 0;
+  constexpr int kSets = 4000;
+  for (int seed = 1; seed <= kSets; ++seed) {
+    const VplSet set =
+        trace_vpls(*scene, {.count = 41, .max_depth = 200, .seed = static_cast<uint64_t>(seed)}, progress);
+    for (const Vpl& v : set.lights)
+      if (v.kind == VplKind::oriented) flux += std::numbers::pi * v.intensity.x / kSets;
+  }
+  // Φ(ρ + ρ² + …) = Φ; the spread of path lengths is √2 of their mean: 0.4 % for 4,000 times 40.
+  EXPECT_NEAR(flux / (4 * std::numbers::pi), 1.0, 0.015);
+}
+
 TEST(TraceVpls, ClosedBoxReflectsTheGeometricSeriesOfItsAlbedo) {
   // Flux that leaves the walls: Φ(ρ + ρ² + …) = Φρ/(1−ρ). An oriented VPL of intensity I emits πI.
   for (float albedo : {0.2f, 0.5f, 0.8f}) {

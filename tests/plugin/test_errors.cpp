@@ -41,6 +41,7 @@ TEST(Errors, NullAndWrongHandlesAreRefusedByEveryFunction) {
     lumicut_render render = nullptr;
     const uint32_t* ids = nullptr;
     const lumicut_vpl* vpls = nullptr;
+    auto vpl_set = make<lumicut_vpl_set>();
     uint64_t count = 0;
     float pixels[3];
     if (!is_device) {
@@ -69,6 +70,8 @@ TEST(Errors, NullAndWrongHandlesAreRefusedByEveryFunction) {
     EXPECT_CODE(lumicut_integrator_set_lights(i, nullptr, 0), LUMICUT_INVALID_ARGUMENT, text);
     EXPECT_CODE(lumicut_integrator_prepare(i, s.get()), LUMICUT_INVALID_ARGUMENT, text);
     EXPECT_CODE(lumicut_integrator_get_lights(i, &vpls, &count), LUMICUT_INVALID_ARGUMENT, text);
+    EXPECT_CODE(api::lights_extension().set(i, &vpl_set), LUMICUT_INVALID_ARGUMENT, text);
+    EXPECT_CODE(api::lights_extension().get(i, &vpl_set), LUMICUT_INVALID_ARGUMENT, text);
     EXPECT_CODE(lumicut_integrator_shade(i, nullptr, 0, nullptr), LUMICUT_INVALID_ARGUMENT, text);
     EXPECT_CODE(lumicut_render_start(i, s.get(), &desc, &render), LUMICUT_INVALID_ARGUMENT, text);
     EXPECT_CODE(lumicut_render_wait(r, 0, &status), LUMICUT_INVALID_ARGUMENT, text);

@@ -99,6 +99,7 @@ TEST(Integrators, AllLightsMeansTheSumOfEachLightAlone) {
     if ((info.traits & LUMICUT_ALL_LIGHTS) == 0) continue;
     ++found;
     api::Integrator i = integrator(device, 50, id.c_str());
+    i.set("clamp_distance", "0.1");  // without it the clamp of each follows how densely they lie
     i.prepare(s);
     const auto lights = i.lights();
     const float all = i.shade({p})[0];
@@ -195,22 +196,144 @@ TEST(Integrators, ThePathTracerListsWhatItUsesAndIgnoresWhatVirtualLightsNeed) {
   EXPECT_CODE(lumicut_integrator_set(i.get(), "error", "0.1"), LUMICUT_INVALID_ARGUMENT, "no parameter \"error\"");
 }
 
+template <typename T>
+bool same_bytes(const std::vector<T>& a, const std::vector<T>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
+}
+
 TEST(Integrators, LightsThatGoOutComeInAgainUnchanged) {
   const api::Device device(2);
   const api::Scene s = scene(device);
   const api::Integrator first = integrator(device);
   const auto image = render(first, s);
-  const auto lights = first.lights();
-  EXPECT_GT(lights.size(), 300u);
+  const auto lights = first.vpls();
+  EXPECT_GT(lights.lights.size(), 300u);
+  EXPECT_TRUE(same_bytes(lights.lights, first.lights()));
   api::Integrator second = integrator(device, 7);
-  second.set_lights(lights);
+  second.set_vpls(lights);
   EXPECT_EQ(render(second, s), image);
-  const auto again = second.lights();
-  ASSERT_EQ(again.size(), lights.size());
-  EXPECT_EQ(std::memcmp(again.data(), lights.data(), lights.size() * sizeof(lumicut_vpl)), 0);
-  second.set_lights({});
+  const auto again = second.vpls();
+  EXPECT_TRUE(same_bytes(again.lights, lights.lights));
+  EXPECT_TRUE(same_bytes(again.origins, lights.origins));
+  EXPECT_EQ(again.light_paths, lights.light_paths);
+  EXPECT_EQ(again.emitter_samples, lights.emitter_samples);
+  second.set_vpls({});
   second.set("vpls", "400");
   EXPECT_EQ(render(second, s), image) << "traced again";
+}
+
+// With an environment, a measured lamp, and an emitter that is black in places: samples there give no light.
+TEST(Integrators, LightsOfEveryKindOfEmitterTellWhereTheyComeFrom) {
+  const api::Device device(2);
+  Host host;
+  host.parameters["vpls"] = "400";
+  host.frame.passes = 1, host.frame.flags = 0;
+  host.materials[4].emission_texture = 2, host.materials[4].emission[0] = 30;
+  std::fill_n(host.texels[1].begin(), host.texels[1].size() / 2, 0.0f);
+  const api::Scene s = host.scene(device);
+  for (const char* id : {"exhaustive", "lightcuts"}) {
+    host.integrator = id;
+    const api::Integrator first = host.method(device);
+    const auto image = render(first, s, host.frame);
+    const auto set = first.vpls();
+    std::map<uint32_t, uint64_t> of;
+    for (size_t i = 0; i < set.origins.size(); ++i) {
+      const lumicut_vpl_origin& o = set.origins[i];
+      ++of[o.source];
+      EXPECT_EQ(o.area > 0, o.source == LUMICUT_SOURCE_AREA);
+      EXPECT_EQ(o.offset > 0, set.lights[i].kind == LUMICUT_VPL_ORIENTED) << "of what lies on a surface";
+    }
+    EXPECT_GT(of[LUMICUT_SOURCE_PATH], 100u);
+    EXPECT_GT(of[LUMICUT_SOURCE_POINT], 1u) << "the lamp, and the environment";
+    EXPECT_GT(of[LUMICUT_SOURCE_AREA], 10u);
+    EXPECT_GT(set.emitter_samples, of[LUMICUT_SOURCE_AREA]);
+    EXPECT_GT(set.light_paths, 0u);
+    api::Integrator second(device, id);
+    second.set_vpls(set);
+    EXPECT_EQ(render(second, s, host.frame), image);
+  }
+}
+
+TEST(Integrators, LightsWithoutOriginsAreAHostsOwn) {
+  const api::Device device(2);
+  const api::Scene s = scene(device);
+  const api::Integrator first = integrator(device);
+  const auto image = render(first, s);
+  auto set = first.vpls();
+  api::Integrator second = integrator(device);
+  second.set_lights(set.lights);
+  const auto own = render(second, s);
+  EXPECT_NE(own, image);
+  for (const lumicut_vpl_origin& o : second.vpls().origins) {
+    EXPECT_EQ(o.source, uint32_t{LUMICUT_SOURCE_PATH});
+    EXPECT_EQ(o.offset, 0);
+    EXPECT_EQ(o.area, 0);
+  }
+  set.origins.clear(), set.emitter_samples = 0;
+  second.set_vpls(set);
+  EXPECT_EQ(render(second, s), own);
+}
+
+TEST(Integrators, LightsOfEmittersArePutFirst) {
+  const api::Device device(2);
+  const api::Scene s = scene(device);
+  const api::Integrator first = integrator(device);
+  const auto image = render(first, s);
+  const auto set = first.vpls();
+  auto mixed = set;  // those of light paths first
+  const auto direct = std::count_if(set.origins.begin(), set.origins.end(),
+                                    [](const auto& o) { return o.source != LUMICUT_SOURCE_PATH; });
+  std::rotate(mixed.lights.begin(), mixed.lights.begin() + direct, mixed.lights.end());
+  std::rotate(mixed.origins.begin(), mixed.origins.begin() + direct, mixed.origins.end());
+  api::Integrator second = integrator(device);
+  second.set_vpls(mixed);
+  EXPECT_EQ(render(second, s), image);
+  EXPECT_TRUE(same_bytes(second.vpls().lights, set.lights));
+}
+
+TEST(Integrators, OriginsAreCheckedByNameAndValue) {
+  const api::Device device(1);
+  api::Integrator i(device, "exhaustive");
+  api::VplSet good;
+  good.lights.resize(3);
+  good.origins.resize(3);
+  good.origins[1] = {LUMICUT_SOURCE_AREA, 0.1f, 2.0f};
+  good.emitter_samples = 1;
+  i.set_vpls(good);
+  const auto refused = [&](auto spoil, const char* text) {
+    auto set = good;
+    spoil(set);
+    try {
+      i.set_vpls(set);
+      ADD_FAILURE() << "taken: " << text;
+    } catch (const api::Exception& error) {
+      EXPECT_EQ(error.code(), LUMICUT_INVALID_ARGUMENT);
+      EXPECT_NE(std::string(error.what()).find(text), std::string::npos) << error.what();
+    }
+  };
+  refused([](auto& s) { s.origins[2].source = 3; }, "lumicut_vpl_origin[2].source: 3 is not in [0, 2]");
+  refused([](auto& s) { s.origins[2].offset = NAN; }, "lumicut_vpl_origin[2].offset: nan");
+  refused([](auto& s) { s.origins[2].offset = INFINITY; }, "lumicut_vpl_origin[2].offset: inf");
+  refused([](auto& s) { s.origins[0].offset = -1; }, "lumicut_vpl_origin[0].offset: -1");
+  refused([](auto& s) { s.origins[1].area = -2; }, "lumicut_vpl_origin[1].area: -2");
+  refused([](auto& s) { s.origins[1].area = INFINITY; }, "lumicut_vpl_origin[1].area: inf");
+  refused([](auto& s) { s.origins[1].area = 0; }, "lumicut_vpl_origin[1].area: is 0");
+  refused([](auto& s) { s.origins[2].area = 3; }, "lumicut_vpl_origin[2].area: 3 is not 0");
+  refused([](auto& s) { s.lights[2].intensity[0] = -1; }, "lumicut_vpl[2].intensity[0]: -1");
+  refused([](auto& s) { s.emitter_samples = 0; }, "lumicut_vpl_set.emitter_samples: 0 is less than the 1 lights");
+  refused([](auto& s) { s.origins.clear(); }, "lumicut_vpl_set.emitter_samples: is 1, but origins is NULL");
+  refused([](auto& s) { s.origins.pop_back(); }, "origins: 2 of 3 lights");
+
+  const lumicut_lights_extension& extension = api::lights_extension();
+  EXPECT_EQ(extension.struct_size, sizeof(lumicut_lights_extension));
+  auto set = make<lumicut_vpl_set>();
+  set.count = 2;
+  EXPECT_CODE(extension.set(i.get(), &set), LUMICUT_INVALID_ARGUMENT, "count is 2");
+  set.reserved = 1;
+  EXPECT_CODE(extension.set(i.get(), &set), LUMICUT_UNSUPPORTED, "lumicut_vpl_set.reserved");
+  EXPECT_CODE(extension.set(i.get(), nullptr), LUMICUT_INVALID_ARGUMENT, "lumicut_vpl_set: is NULL");
+  EXPECT_CODE(extension.get(i.get(), nullptr), LUMICUT_INVALID_ARGUMENT, "lumicut_vpl_set: is NULL");
+  EXPECT_CODE(extension.get(i.get(), &set), LUMICUT_INVALID_STATE, "not prepared");
 }
 
 TEST(Integrators, HostLightsAreCheckedByNameAndValue) {
@@ -243,14 +366,15 @@ TEST(Integrators, SpheresGoOutAndComeInAgainWithTheirRadii) {
   first.set("virtual_lights", "spheres");
   const auto image = render(first, s);
   EXPECT_NE(image, render(points, s));
-  const auto lights = first.lights();
+  const auto set = first.vpls();
+  const auto& lights = set.lights;
   uint64_t spheres = 0, others = 0;
   for (const lumicut_vpl& l : lights) (l.kind == LUMICUT_VPL_SPHERE ? spheres : others) += 1;
   EXPECT_GT(spheres, 100u);
   EXPECT_GT(others, 50u) << "lamps are what they were";
   for (const char* setting : {"spheres", "points"}) {  // the host's own lights are what they are
     api::Integrator second = integrator(device, 7);
-    second.set_lights(lights);
+    second.set_vpls(set);
     second.set("virtual_lights", setting);
     EXPECT_EQ(render(second, s), image);
   }

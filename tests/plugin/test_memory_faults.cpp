@@ -19,6 +19,7 @@
 
 #include "failing_memory.h"
 #include "lumicut/lumicut.h"
+#include "lumicut/lumicut_lights.h"
 #include "lumicut/lumicut_state.h"
 
 namespace {
@@ -182,6 +183,12 @@ Image lead_life(lumicut_device device, const char* id, const char* accel) {
     const lumicut_vpl* lights = nullptr;
     uint64_t count = 0;
     call("get_lights", [&] { return lumicut_integrator_get_lights(integrator.handle, &lights, &count); });
+    auto set = make<lumicut_vpl_set>();
+    const auto* origins = static_cast<const lumicut_lights_extension*>(lumicut_get_extension(LUMICUT_LIGHTS_EXTENSION));
+    call("get lights and origins", [&] { return origins->get(integrator.handle, &set); });
+    Owned<lumicut_integrator> taker;
+    call("integrator_create", [&] { return lumicut_integrator_create(device, id, &taker.handle); });
+    call("set lights and origins", [&] { return origins->set(taker.handle, &set); });
   }
 
   Owned<lumicut_render> render;

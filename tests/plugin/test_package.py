@@ -34,19 +34,22 @@ def first_example():
 
 
 class Header(unittest.TestCase):
+    HEADERS = ("lumicut.h", "lumicut_lights.h", "lumicut_state.h")
     WARNINGS = ["-Wall", "-Wextra", "-Wpadded", "-pedantic", "-pedantic-errors", "-Werror", "-fsyntax-only"]
 
     def compile(self, compiler, standard, language, header, warnings):
         run(compiler, "-x", language, f"-std={standard}", *warnings, f"-I{INCLUDE}", "-",
             input=f"#include <lumicut/{header}>\nint use(void);\nint use(void) {{ return LUMICUT_ABI_MAJOR; }}\n")
 
-    def test_c_header_compiles_clean_and_without_padding_in_every_standard(self):
+    def test_c_headers_compile_clean_and_without_padding_in_every_standard(self):
         for standard in ("c99", "c11", "c17", "gnu99"):
             with self.subTest(standard):
-                self.compile(CC, standard, "c", "lumicut.h", [*self.WARNINGS, "-Wstrict-prototypes", "-Wc++-compat"])
+                for header in self.HEADERS:
+                    self.compile(CC, standard, "c", header, [*self.WARNINGS, "-Wstrict-prototypes", "-Wc++-compat"])
         for standard in ("c++17", "c++20"):
             with self.subTest(standard):
-                self.compile(CXX, standard, "c++", "lumicut.h", self.WARNINGS)
+                for header in self.HEADERS:
+                    self.compile(CXX, standard, "c++", header, self.WARNINGS)
 
     def test_cxx_wrapper_compiles_clean_in_every_standard(self):
         for standard in ("c++17", "c++20"):

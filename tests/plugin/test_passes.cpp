@@ -212,7 +212,8 @@ TEST(Passes, IntervalsHoldThePathTracersRadianceAsOftenAsTheySay) {
   // The reference has 5,760 paths a pixel, a noise of about a tenth of the intervals'. Twelve sets of passes whose
   // pixels share lights: the share itself is known to about 1 %.
   EXPECT_GT(inside / all, 0.93);
-  EXPECT_LT(inside / all, 0.985);
+  // More than they say, too, for the camera's samples of passes are stratified and counted as if they were not.
+  EXPECT_LT(inside / all, 0.995);
   EXPECT_NEAR(sum / truth_sum, 1.0, 0.01);
 }
 

@@ -316,7 +316,8 @@ TEST(Render, ItsStatisticsAreJsonWithWhatIsPromised) {
   EXPECT_TRUE(stats.at("phases").contains("light paths"));
   EXPECT_TRUE(stats.at("phases").contains("render"));
   EXPECT_LE(phases, stats.at("seconds").get<double>());
-  EXPECT_NEAR(stats.at("values").at("vpls").get<double>(), 300, 30);
+  // Their number follows from that of the light paths, which is fixed beforehand: four deviations.
+  EXPECT_NEAR(stats.at("values").at("vpls").get<double>(), 300, 60);
   EXPECT_GT(stats.at("values").at("light_paths").get<double>(), 0);
   EXPECT_GT(stats.at("peak_bytes").get<double>(), 1e6);
   const auto& counters = stats.at("counters");

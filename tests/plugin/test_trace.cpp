@@ -61,13 +61,13 @@ TEST(HostTrace, GivesTheImageOfTheLibrarysOwnTracer) {
   const api::Device device(2);
   api::Scene s = scene(device);
   // Light paths part where two tracers round differently, so both get the same lights.
-  const api::Integrator own = integrator(device, 200);
+  const api::Integrator own = integrator(device, 200).set("clamp_distance", "0.1");
   const auto expected = render(own, s);
 
   Host host;
   s.set_trace(host.trace());
   s.commit();
-  api::Integrator theirs = integrator(device, 200);
+  api::Integrator theirs = integrator(device, 200).set("clamp_distance", "0.1");
   theirs.set_lights(own.lights());
   const auto image = render(theirs, s);
   EXPECT_GT(mean(image), 0.01);
@@ -95,7 +95,7 @@ TEST(HostTrace, InstancesAreCountedByMesh) {
   c.to_world[3] = 1.2f, c.to_world[11] = 3;
   s.set_camera(c);
   s.commit();
-  const api::Integrator own = integrator(device, 100);
+  const api::Integrator own = integrator(device, 100).set("clamp_distance", "0.1");
   const auto expected = render(own, s);
 
   Host host;
@@ -103,7 +103,7 @@ TEST(HostTrace, InstancesAreCountedByMesh) {
   host.instanced = true;
   s.set_trace(host.trace());
   s.commit();
-  api::Integrator theirs = integrator(device, 100);
+  api::Integrator theirs = integrator(device, 100).set("clamp_distance", "0.1");
   theirs.set_lights(own.lights());
   EXPECT_LT(differing(expected, render(theirs, s)), 0.01);
 }
@@ -165,7 +165,7 @@ TEST(HostTrace, AnswersThatCannotBeFailTheRenderAndNotTheProcess) {
     t.occluded = [](void*, lumicut_ray*, uint64_t) {};
     s.set_trace(t);
     s.commit();
-    const api::Integrator i = integrator(device, 50);
+    const api::Integrator i = integrator(device, 50).set("clamp_distance", "0.1");
     const api::Render r(i, s, frame());
     auto status = make<lumicut_status>();
     EXPECT_CODE(lumicut_render_wait(r.get(), LUMICUT_FOREVER, &status), LUMICUT_INVALID_ARGUMENT, liar.text);

@@ -85,6 +85,7 @@ void lead_a_hosts_life() {
   EXPECT_THROW(i.value("no_such"), api::Exception);
   i.prepare(s);
   i.set_lights(i.lights());
+  i.set_vpls(i.vpls());
   i.prepare(s);
   EXPECT_EQ(i.lights_view().size(), i.lights().size());
   lumicut_point p{};

@@ -27,7 +27,16 @@ inline VplSet lights_of(const Scene& scene, uint32_t count, uint64_t seed = 1, f
   return trace_vpls(scene, {.count = count, .seed = seed, .sphere_scale = sphere_scale}, progress);
 }
 
-// The same, off their surfaces: for an integrator that is prepared by hand.
+// The same in a scene that is so many times as large, and gives so many times the light to its square.
+inline VplSet scaled(VplSet set, float scale) {
+  for (Vpl& v : set.lights) {
+    v.position = v.position * scale, v.intensity = v.intensity * (scale * scale);
+    v.offset *= scale, v.cell *= scale * scale, v.clamp2 *= scale * scale;
+  }
+  return set;
+}
+
+// As lights_of, off their surfaces: for an integrator that is prepared by hand.
 inline VplSet standing_lights_of(const Scene& scene, uint32_t count) {
   return off_surfaces(lights_of(scene, count), scene);
 }

@@ -129,7 +129,7 @@ class Render(Cli):
         self.assertLessEqual(inner, stats["seconds"] * 1.01 + 0.001)
         self.assertEqual((stats["width"], stats["height"], stats["seed"]), (24, 24, "7"))
         self.assertEqual(stats["parameters"]["error"], "0.05")
-        self.assertEqual((self.folder / "a.vpl").stat().st_size, 32 + 64 * stats["vpls"])
+        self.assertEqual((self.folder / "a.vpl").stat().st_size, 40 + 76 * stats["vpls"])
 
     def test_peak_memory_is_the_commands_own(self):
         ballast = bytearray(os.urandom(1)) * (400 << 20)  # getrusage gives it to whom this process starts
@@ -138,13 +138,36 @@ class Render(Cli):
         forecast = json.loads(lumicut("check", SCENE, "--size", "24x24", "--vpls", "200", "--json").stdout)["forecast"]
         self.assertLess(forecast["peak_bytes"], len(ballast) / 2)
 
-    def test_the_same_lights_give_the_same_image(self):
-        first, second, lights = (self.folder / n for n in ("a.exr", "b.exr", "a.vpl"))
-        self.assert_ends(self.render("-i", "exhaustive", "-o", first, "--vpl-out", lights), OK)
-        self.assert_ends(self.render("-i", "exhaustive", "-o", second, "--vpl-in", lights, "--threads", "1"), OK)
-        result = lumicut("compare", first, second, "--json")
+    def difference(self, a, b):
+        result = lumicut("compare", a, b, "--no-flip", "--json")
         self.assert_ends(result, OK)
-        self.assertEqual(json.loads(result.stdout)["max_relative_error"], 0)
+        return json.loads(result.stdout)["max_relative_error"]
+
+    def test_the_same_lights_give_the_same_image(self):
+        first, second, lights, again = (self.folder / n for n in ("a.exr", "b.exr", "a.vpl", "b.vpl"))
+        for how in (("exhaustive",), ("exhaustive", "-p", "virtual_lights=spheres"), ("lightcuts", "--seed", "5")):
+            self.assert_ends(self.render("-i", *how, "-o", first, "--vpl-out", lights), OK)
+            self.assert_ends(self.render("-i", *how, "-o", second, "--vpl-in", lights, "--vpl-out", again, "--threads", "1"), OK)
+            self.assertEqual(again.read_bytes(), lights.read_bytes())
+            self.assertEqual(self.difference(first, second), 0)
+
+    def test_lights_of_older_files_and_damaged_ones(self):
+        image, lights, bad = (self.folder / n for n in ("a.exr", "a.vpl", "bad.vpl"))
+        self.assert_ends(self.render("-i", "exhaustive", "-o", image, "--vpl-out", lights), OK)
+        whole = lights.read_bytes()
+        count = int.from_bytes(whole[16:24], "little")
+        records = [whole[40 + 76 * i:40 + 76 * i + 64] for i in range(count)]
+        old = self.folder / "old.vpl"
+        old.write_bytes(b"LUMIVPL\n" + (1).to_bytes(4, "little") + (64).to_bytes(4, "little") + whole[16:24] + bytes(8) +
+                        b"".join(records))
+        result = self.render("-i", "exhaustive", "-o", image, "--vpl-in", old)
+        self.assert_ends(result, OK)
+        self.assertIn(f"{count} lights", result.stdout)
+        for damaged, text in ((whole[:-1], f"says {count} lights"), (whole[:36], "header"),
+                              (whole[:40 + 64] + b"\x09" + whole[40 + 65:], "light 0: source is 9"),
+                              (whole[:32] + bytes(8) + whole[40:], "0 samples of emitters")):
+            bad.write_bytes(damaged)
+            self.assert_ends(self.render("-i", "exhaustive", "-o", image, "--vpl-in", bad), BAD_FILE, "bad.vpl", text)
 
     def test_a_crop_is_a_part_of_the_whole(self):
         whole, part = self.folder / "whole.exr", self.folder / "part.exr"

@@ -375,7 +375,8 @@ typedef struct lumicut_point { /* a surface point of the host's, 64 bytes */
   uint32_t pixel;            /* points of one pixel lie together; methods that share work within a pixel use it */
 } lumicut_point;
 
-/* The host's own VPLs, instead of those traced from the scene; count 0: trace again. */
+/* The host's own VPLs, instead of those traced from the scene; count 0: trace again. lumicut_lights.h also
+ * takes where they come from. */
 LUMICUT_API lumicut_result lumicut_integrator_set_lights(lumicut_integrator integrator, const lumicut_vpl* lights, uint64_t count); /* [object] */
 LUMICUT_API lumicut_result lumicut_integrator_prepare(lumicut_integrator integrator, lumicut_scene scene); /* [object] traces VPLs, builds trees; keeps the scene */
 LUMICUT_API lumicut_result lumicut_integrator_get_lights(lumicut_integrator integrator, const lumicut_vpl** lights, uint64_t* count); /* [object] view, after prepare */

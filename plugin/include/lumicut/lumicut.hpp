@@ -1,4 +1,5 @@
-// Lumicut for C++17 hosts: all of lumicut.h with counted handles, exceptions and arrays that know their length.
+// Lumicut for C++17 hosts: all of lumicut.h and lumicut_lights.h with counted handles, exceptions and arrays that know
+// their length.
 //
 // Handles are values: copying one shares the object, the last one gone releases it. A null handle throws when it is
 // used. Ownership, threads, spaces and units are those of lumicut.h.
@@ -18,6 +19,7 @@
 #include <vector>
 
 #include "lumicut.h"
+#include "lumicut_lights.h"
 
 // Every function of lumicut.h, without "lumicut_".
 // clang-format off
@@ -167,10 +169,45 @@ inline std::vector<lumicut_channel_info> channels(const Functions& f = linked())
   return all;
 }
 
-// nullptr: the library has no such extension. T is its table: lumicut_state_extension.
+// nullptr: the library has no such extension. T is its table, such as lumicut_state_extension.
 template <typename T>
 const T* extension(const char* id, const Functions& f = linked()) {
   return static_cast<const T*>(f.get_extension(id));
+}
+
+// Virtual lights with what is known of where they come from.
+struct VplSet {
+  std::vector<lumicut_vpl> lights;
+  std::vector<lumicut_vpl_origin> origins;  // as many, or none: nothing is known
+  uint64_t light_paths = 0, emitter_samples = 0;
+};
+
+// Throws Exception(LUMICUT_UNSUPPORTED) where the library has no extension "lumicut.lights/1".
+inline const lumicut_lights_extension& lights_extension(const Functions& f = linked()) {
+  const auto* table = extension<lumicut_lights_extension>(LUMICUT_LIGHTS_EXTENSION, f);
+  if (table == nullptr) throw Exception(LUMICUT_UNSUPPORTED, "lacks the extension " LUMICUT_LIGHTS_EXTENSION);
+  return *table;
+}
+
+// The texts of errors begin as those of check().
+inline VplSet get_vpls(lumicut_integrator integrator, const Functions& f = linked(), const std::string& doing = {}) {
+  auto view = make<lumicut_vpl_set>();
+  check(f, lights_extension(f).get(integrator, &view), doing);
+  return {{view.lights, view.lights + view.count},
+          {view.origins, view.origins + view.count},
+          view.light_paths,
+          view.emitter_samples};
+}
+inline void set_vpls(lumicut_integrator integrator, const VplSet& set, const Functions& f = linked(),
+                     const std::string& doing = {}) {
+  if (!set.origins.empty() && set.origins.size() != set.lights.size())
+    throw Exception(LUMICUT_INVALID_ARGUMENT, "origins: " + std::to_string(set.origins.size()) + " of " +
+                                                  std::to_string(set.lights.size()) + " lights");
+  auto view = make<lumicut_vpl_set>();
+  view.count = set.lights.size(), view.lights = set.lights.data();
+  if (!set.origins.empty()) view.origins = set.origins.data();
+  view.light_paths = set.light_paths, view.emitter_samples = set.emitter_samples;
+  check(f, lights_extension(f).set(integrator, &view), doing);
 }
 
 // ---- Handles -------------------------------------------------------------------------------------------------------
@@ -362,6 +399,9 @@ class Integrator : public Handle<lumicut_integrator> {
     check(functions(), functions().integrator_get_lights(get(), &view, &count));
     return {view, static_cast<size_t>(count)};
   }
+  // Lights together with their origins: those that go out and come in again render the same image.
+  VplSet vpls() const { return get_vpls(get(), functions()); }
+  void set_vpls(const VplSet& set) { api::set_vpls(get(), set, functions()); }
   // Three floats a point.
   std::vector<float> shade(Span<const lumicut_point> points) const {
     std::vector<float> radiance(3 * points.size());

@@ -1,0 +1,42 @@
+#include "lights/light_spacing.h"
+
+#include <array>
+#include <cmath>
+
+namespace lumicut {
+
+namespace {
+
+std::vector<double> places_of(std::span<const Vpl> lights) {
+  std::vector<double> places(3 * lights.size());
+  for (size_t i = 0; i < lights.size(); ++i)
+    for (int k = 0; k < 3; ++k) places[3 * i + static_cast<size_t>(k)] = static_cast<double>(lights[i].position[k]);
+  return places;
+}
+
+}  // namespace
+
+LightSpacing::LightSpacing(std::span<const Vpl> lights, float lonely, const Progress* progress)
+    : places_(places_of(lights)), lonely_(lonely), tree_(places_, 3, progress) {}
+
+// The `itself` nearest, 0 or 1, are not counted.
+float LightSpacing::distance(const double* place, size_t itself, BallQueryTree::Scratch& scratch) const {
+  std::array<double, kNeighbour + 1> dist2;
+  const size_t found = tree_.nearest_distances(place, kNeighbour + itself, dist2.data(), scratch);
+  if (found <= itself) return lonely_;
+  const double farthest = std::sqrt(dist2[found - 1]);
+  return static_cast<float>(farthest *
+                            std::sqrt(static_cast<double>(kNeighbour) / static_cast<double>(found - itself)));
+}
+
+float LightSpacing::at(const Vec3f& position, BallQueryTree::Scratch& scratch) const {
+  const double place[3] = {static_cast<double>(position.x), static_cast<double>(position.y),
+                           static_cast<double>(position.z)};
+  return distance(place, 0, scratch);
+}
+
+float LightSpacing::of_light(size_t i, BallQueryTree::Scratch& scratch) const {
+  return distance(&places_[3 * i], 1, scratch);
+}
+
+}  // namespace lumicut

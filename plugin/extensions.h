@@ -1,0 +1,9 @@
+// The tables of optional extensions.
+#pragma once
+
+namespace lumicut {
+
+const void* lights_extension();  // "lumicut.lights/1" (lumicut_lights.h)
+const void* state_extension();   // "lumicut.state/1" (lumicut_state.h)
+
+}  // namespace lumicut

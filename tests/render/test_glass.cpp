@@ -1,0 +1,114 @@
+// Glass: virtual lights with compensation, averaged over iterations, give the path tracer's image.
+#include <gtest/gtest.h>
+
+#include "tests/support/render.h"
+
+namespace lumicut {
+namespace {
+
+enum class Glass { none, sheet_out, sheet_in, slab, ball };
+
+void add_ball(Mesh& mesh, const Vec3f& center, float radius, uint32_t material) {
+  constexpr int kRings = 12, kSegments = 24;
+  const auto at = [&](int i, int j) {
+    const float theta = 3.14159265f * static_cast<float>(i) / kRings,
+                phi = 6.2831853f * static_cast<float>(j) / kSegments;
+    return center + Vec3f{std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)} * radius;
+  };
+  for (int i = 0; i < kRings; ++i)
+    for (int j = 0; j < kSegments; ++j)
+      test::add_quad(mesh, at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1), material);
+}
+
+// A closed room of two halves with glass between them; the light is in the one, the camera in the other.
+std::unique_ptr<Scene> make_glass(Glass kind) {
+  auto scene = std::make_unique<Scene>(Scene::Config{"bvh", true});
+  Material glass = test::diffuse(1, 1, 1);
+  glass.lobe = LobeModel::ggx, glass.specular = {1, 1, 1}, glass.roughness = 0, glass.transmission = 1;
+  Material glowing = test::diffuse(0, 0, 0);
+  glowing.emission = {2, 2, 2};
+  scene->set_materials({test::diffuse(0.6f, 0.6f, 0.6f), glass, glowing});
+  Mesh mesh;
+  test::add_box(mesh, {-1, -1, -1}, {1, 1, 1}, 0, true);
+  mesh.triangle_materials[6] = mesh.triangle_materials[7] = 2;  // the wall at y = 1
+  switch (kind) {
+    case Glass::none:
+      break;
+    case Glass::sheet_out:
+      test::add_quad(mesh, {-1, 0, -1}, {1, 0, -1}, {1, 0, 1}, {-1, 0, 1}, 1);
+      break;
+    case Glass::sheet_in:
+      test::add_quad(mesh, {-1, 0, 1}, {1, 0, 1}, {1, 0, -1}, {-1, 0, -1}, 1);
+      break;
+    case Glass::slab:
+      test::add_box(mesh, {-1.1f, 0, -1.1f}, {1.1f, 0.1f, 1.1f}, 1, false);
+      break;
+    case Glass::ball:
+      add_ball(mesh, {0, 0.1f, 0}, 0.6f, 1);
+  }
+  scene->add_mesh(std::move(mesh));
+  Camera camera;
+  camera.position = {0, -0.95f, 0.2f};
+  camera.right = {1, 0, 0}, camera.forward = normalize(Vec3f{0.3f, 1, -0.5f});
+  camera.up = normalize(cross(camera.right, camera.forward));
+  camera.tan_half_fov_y = 0.8f;
+  scene->set_camera(camera);
+  Progress progress;
+  scene->commit(progress);
+  return scene;
+}
+
+// No chance blackens a pixel that shows a mirror.
+TEST(Mirror, OfOneSampleHasNoBlackPixel) {
+  auto scene = std::make_unique<Scene>(Scene::Config{"bvh", true});
+  Material mirror = test::diffuse(0.6f, 0.55f, 0.5f);
+  mirror.lobe = LobeModel::ggx, mirror.specular = {1, 1, 1}, mirror.metallic = 1, mirror.roughness = 0;
+  scene->set_materials({test::diffuse(0.6f, 0.6f, 0.6f), mirror});
+  Mesh mesh;
+  test::add_box(mesh, {-1, -1, -1}, {1, 1, 1}, 0, true);
+  test::add_quad(mesh, {-0.99f, 0.99f, -0.99f}, {0.99f, 0.99f, -0.99f}, {0.99f, 0.99f, 0.99f}, {-0.99f, 0.99f, 0.99f},
+                 1);
+  scene->add_mesh(std::move(mesh));
+  Light lamp;
+  lamp.type = LightType::point, lamp.position = {0.3f, -0.5f, 0.6f}, lamp.value = {1, 1, 1};
+  scene->set_lights({lamp});
+  Camera camera;
+  camera.position = {0, -0.9f, 0.1f};
+  camera.right = {1, 0, 0}, camera.forward = {0, 1, 0}, camera.up = {0, 0, 1}, camera.tan_half_fov_y = 0.4f;
+  scene->set_camera(camera);
+  Progress progress;
+  scene->commit(progress);
+  for (const Rgb& c : test::render(*scene, "exhaustive", test::lights_of(*scene, 100), {}).radiance)
+    EXPECT_GT(luminance(c), 0.001f);
+}
+
+double mean_of(const std::vector<Rgb>& pixels) {
+  double sum = 0;
+  for (const Rgb& c : pixels) sum += luminance(c);
+  return sum / static_cast<double>(pixels.size());
+}
+
+class OfGlass : public testing::TestWithParam<Glass> {};
+INSTANTIATE_TEST_SUITE_P(Kinds, OfGlass,
+                         testing::Values(Glass::none, Glass::sheet_out, Glass::sheet_in, Glass::slab, Glass::ball));
+
+TEST_P(OfGlass, CompensatedIterationsGiveThePathTracersImage) {
+  const auto scene = make_glass(GetParam());
+  const auto samples = [](uint32_t count) { return test::RenderOptions{.width = 24, .height = 18, .samples = count}; };
+  const double truth = mean_of(test::render(*scene, "path_tracer", {}, {{"samples", "4"}}, samples(1024)).radiance);
+  constexpr uint64_t kIterations = 40;
+  double sum = 0, sum2 = 0;
+  for (uint64_t seed = 1; seed <= kIterations; ++seed) {
+    const double mean = mean_of(test::render(*scene, "exhaustive", test::lights_of(*scene, 200, seed),
+                                             {{"compensate", "true"}, {"seed", std::to_string(seed)}}, samples(8))
+                                    .radiance);
+    sum += mean, sum2 += mean * mean;
+  }
+  const double mean = sum / kIterations,
+               deviation = std::sqrt(std::max(0.0, sum2 / kIterations - mean * mean) / kIterations);
+  RecordProperty("ratio", std::to_string(mean / truth) + " +- " + std::to_string(deviation / truth));
+  EXPECT_NEAR(mean / truth, 1.0, 0.01 + 3 * deviation / truth);
+}
+
+}  // namespace
+}  // namespace lumicut
