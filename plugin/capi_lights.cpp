@@ -5,6 +5,28 @@
 
 using namespace lumicut;
 
+namespace lumicut {
+
+template <>
+struct Descriptor<lumicut_vpl_set> {
+  using S = lumicut_vpl_set;
+  static constexpr const char* name = "lumicut_vpl_set";
+  // NOLINTBEGIN(bugprone-sizeof-expression): the sizes of the pointers are meant
+  static constexpr FieldSpan fields[] = {
+      {offsetof(S, struct_size), sizeof(S::struct_size)},
+      {offsetof(S, reserved), sizeof(S::reserved)},
+      {offsetof(S, count), sizeof(S::count)},
+      {offsetof(S, lights), sizeof(S::lights)},
+      {offsetof(S, origins), sizeof(S::origins)},
+      {offsetof(S, light_paths), sizeof(S::light_paths)},
+      {offsetof(S, emitter_samples), sizeof(S::emitter_samples)},
+  };
+  // NOLINTEND(bugprone-sizeof-expression)
+  static_assert(fields_fill(fields, sizeof(S)));
+};
+
+}  // namespace lumicut
+
 namespace {
 
 void set(lumicut_integrator integrator, const lumicut_vpl_set& lights, const char* user) {

@@ -1,9 +1,8 @@
-// The fields of every descriptor in lumicut.h and its extensions, in order: what the growth rule needs to know. A field
-// that is missing here or out of order does not compile.
+// The fields of every descriptor in lumicut.h, in order: what the growth rule needs to know. A field that is missing
+// here or out of order does not compile.
 #pragma once
 
 #include "plugin/boundary.h"
-#include "plugin/include/lumicut/lumicut_lights.h"
 
 namespace lumicut {
 
@@ -53,10 +52,6 @@ LUMICUT_DESCRIPTOR(lumicut_profile, F(struct_size), F(vertical_count), F(horizon
 LUMICUT_DESCRIPTOR(lumicut_environment, F(struct_size), F(group), F(color), F(texture), F(world_to_map), F(flags));
 LUMICUT_DESCRIPTOR(lumicut_camera, F(struct_size), F(orthographic), F(to_world), F(fov_y), F(height), F(shift),
                    F(near_clip), F(far_clip), F(pixel_aspect), F(lens_radius), F(focus_distance));
-// NOLINTBEGIN(bugprone-sizeof-expression): the sizes of the pointers are meant
-LUMICUT_DESCRIPTOR(lumicut_vpl_set, F(struct_size), F(reserved), F(count), F(lights), F(origins), F(light_paths),
-                   F(emitter_samples));
-// NOLINTEND(bugprone-sizeof-expression)
 LUMICUT_DESCRIPTOR(lumicut_trace, F(struct_size), F(batch), F(intersect), F(occluded), F(user));
 LUMICUT_DESCRIPTOR(lumicut_integrator_info, F(struct_size), F(param_count), F(id), F(label), F(description), F(source),
                    F(traits), F(reserved), F(interactive), F(preview), F(draft), F(good), F(reference));
