@@ -18,6 +18,10 @@ struct Aabb {
   bool empty() const { return !(lo.x <= hi.x && lo.y <= hi.y && lo.z <= hi.z); }
   Vec3f center() const { return (lo + hi) * 0.5f; }
   Vec3f extent() const { return hi - lo; }
+  int longest_axis() const {
+    const Vec3f e = extent();
+    return e.x >= e.y && e.x >= e.z ? 0 : (e.y >= e.z ? 1 : 2);
+  }
   float diagonal2() const { return empty() ? 0.0f : length2(extent()); }
   float diagonal() const { return std::sqrt(diagonal2()); }
   // Half of the surface area: xy + yz + zx. 0 when empty.

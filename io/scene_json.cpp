@@ -774,7 +774,7 @@ class SceneReader {
   SceneData scene_;
   TextureStore textures_;
   std::map<std::string, uint32_t> by_name_;
-  std::vector<Mesh> visible_lights_;  // visible lights: after all other meshes
+  std::vector<Mesh> visible_lights_;  // after all other meshes
   bool z_up_ = false;
   double scale_ = 1;
 };

@@ -17,6 +17,13 @@ Aabb EmitterShape::bounds() const {
   return box;
 }
 
+Vec2f EmitterShape::along_edges(const Vec3f& at) const {
+  const float uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), det = uu * vv - uv * uv;
+  const Vec3f d = at - corner;
+  const float du = dot(d, u), dv = dot(d, v);
+  return {(vv * du - uv * dv) / det, (uu * dv - uv * du) / det};
+}
+
 std::optional<EmitterShape> LightSampler::shape(size_t i) const {
   const Emitter& e = sampler_[extended_ + i];
   EmitterShape s;
@@ -52,27 +59,23 @@ std::optional<EmitterShape> LightSampler::shape(size_t i) const {
   return s;
 }
 
-double LightSampler::cell(size_t i, uint64_t count) const {
-  const std::optional<EmitterShape> s = shape(i);
-  if (!s) return 0.0;
+double LightSampler::cell(size_t i, const EmitterShape& s, uint64_t count) const {
   const double lights = static_cast<double>(count) * power_.sum(extended_ + i, extended_ + i + 1) /
                         power_.sum(extended_, sampler_.size());
-  return static_cast<double>(s->area) * (s->both_sides ? 2.0 : 1.0) / lights;
+  return static_cast<double>(s.area) * (s.both_sides ? 2.0 : 1.0) / lights;
 }
 
-Vpl LightSampler::place_on(size_t i, const Vec3f& at, const Vec3f& from, float area, float& offset) const {
+Vpl LightSampler::place_on(size_t i, const EmitterShape& s, const Vec3f& at, const Vec3f& from, float area,
+                           float& offset) const {
   const Emitter& e = sampler_[extended_ + i];
-  const EmitterShape s = *shape(i);
   Vpl v;
   v.kind = VplKind::oriented, v.position = at, v.normal = s.normal;
   if (e.kind == Kind::triangle) {
     // Barycentric coordinates of the place, and the rest as of any hit.
-    const float uu = dot(s.u, s.u), uv = dot(s.u, s.v), vv = dot(s.v, s.v);
-    const Vec3f d = at - s.corner;
-    const float du = dot(d, s.u), dv = dot(d, s.v), det = uu * vv - uv * uv;
+    const Vec2f along = s.along_edges(at);
     RayHit hit;
-    hit.hit.u = std::clamp((vv * du - uv * dv) / det, 0.0f, 1.0f);
-    hit.hit.v = std::clamp((uu * dv - uv * du) / det, 0.0f, 1.0f - hit.hit.u);
+    hit.hit.u = std::clamp(along.x, 0.0f, 1.0f);
+    hit.hit.v = std::clamp(along.y, 0.0f, 1.0f - hit.hit.u);
     hit.hit.prim = e.triangle, hit.hit.geom = e.index, hit.hit.inst = scene_.hit_instance(e.index, e.instance);
     const SurfaceHit surface = scene_.surface(hit);
     if (s.both_sides && dot(from - at, v.normal) < 0.0f) v.normal = -v.normal;

@@ -24,9 +24,8 @@ struct EmittedRay {
 struct DirectSample {
   Vpl vpl;
   bool seen_by_rays = false;  // paths may find it too: a mesh, the environment, a rectangle or disk [light_surfaces.h]
-  bool on_mesh = false;
-  float offset = 0.0f;   // how far shadow rays end before its surface
-  double density = 0.0;  // of what rays find: for each unit of area, or for each steradian of the environment
+  float offset = 0.0f;        // how far shadow rays end before its surface
+  double density = 0.0;       // of what rays find: for each unit of area, or for each steradian of the environment
 };
 
 // Form of an emitter with extent.
@@ -39,6 +38,8 @@ struct EmitterShape {
   float radius = 0;  // sphere
   bool both_sides = false;
   Aabb bounds() const;
+  // A place of its plane from the corner, in units of the edges.
+  Vec2f along_edges(const Vec3f& at) const;
 };
 
 // Radiance of a rectangle or disk at the cosine to its axis, above 0.
@@ -55,13 +56,13 @@ class LightSampler {
   // True where some emitter beside the environment has extent, and so needs many VPLs for its direct light.
   bool has_extended() const { return extended_ < sampler_.size(); }
   // Those emitters by number; what they are, empty for suns; and how large a part of the surface (m², one side) each of
-  // `count` VPLs stands for.
+  // `count` VPLs stands for. `s`: of shape(i), here and below.
   size_t extended_count() const { return sampler_.size() - extended_; }
   std::optional<EmitterShape> shape(size_t i) const;
-  double cell(size_t i, uint64_t count) const;
+  double cell(size_t i, const EmitterShape& s, uint64_t count) const;
   // The place `at` on its surface as a virtual light, seen from `from`, that stands for the area `area`; ends of shadow
   // rays stand off it by `offset`.
-  Vpl place_on(size_t i, const Vec3f& at, const Vec3f& from, float area, float& offset) const;
+  Vpl place_on(size_t i, const EmitterShape& s, const Vec3f& at, const Vec3f& from, float area, float& offset) const;
   // Their numbers: of a light, of a triangle in an instance of its mesh. Empty where it is none.
   std::optional<size_t> emitter_of_light(uint32_t light) const;
   std::optional<size_t> emitter_of_triangle(uint32_t mesh, uint32_t triangle, uint32_t instance) const;

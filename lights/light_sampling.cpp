@@ -192,7 +192,6 @@ DirectSample LightSampler::sample_light(Rng& rng) const {
   const auto weight = static_cast<float>(1.0 / share);
   const ExtendedSample extended = extended_light(e, weight, rng);
   s.vpl = extended.vpl, s.offset = extended.offset;
-  s.on_mesh = e.kind == Kind::triangle;
   s.seen_by_rays = e.kind != Kind::sphere && e.kind != Kind::sun, s.density = share * extended.area_pdf;
   return s;
 }

@@ -47,7 +47,6 @@ bool LightSurfaces::next(const Vec3f& origin, const Vec3f& direction, float& nea
   hit.t = ray.ray.tfar;
   near = hit.t * (1.0f + 1e-5f) + 1e-12f;
   const Light& light = scene_.lights()[hit.light];
-  hit.area = area(light);
   hit.cosine = -dot(normalize(cross(light.u, light.v)), direction);
   hit.radiance = hit.cosine > 0.0f ? light_radiance(light, hit.cosine) : Rgb{};
   return true;

@@ -15,7 +15,7 @@ class LightSurfaces final : private HitFilter {
 
   struct Hit {
     uint32_t light;  // of the scene
-    float t, cosine, area;
+    float t, cosine;
     Rgb radiance;
   };
   // Lights that shine against a ray of unit direction, between its origin and `far`; nearest first.
@@ -26,10 +26,10 @@ class LightSurfaces final : private HitFilter {
     for (int i = 0; i < kMostLights && next(origin, direction, near, far, hit); ++i)
       if (max_component(hit.radiance) > 0.0f) fn(hit);
   }
-  static float area(const Light& light);
-  static bool has(const Light& light) { return light.type == LightType::rectangle || light.type == LightType::disk; }
 
  private:
+  static float area(const Light& light);
+  static bool has(const Light& light) { return light.type == LightType::rectangle || light.type == LightType::disk; }
   static constexpr int kMostLights = 64;  // along one ray
   bool next(const Vec3f& origin, const Vec3f& direction, float& near, float far, Hit& hit) const;
   bool passes(uint32_t mesh, uint32_t prim, float u, float v) const override;

@@ -60,10 +60,8 @@ std::optional<Place> flat_place(const EmitterShape& s, const Vec3f& from, float 
 }
 
 bool within_disk(const EmitterShape& s, const Vec3f& at) {
-  const float uu = dot(s.u, s.u), uv = dot(s.u, s.v), vv = dot(s.v, s.v), det = uu * vv - uv * uv;
-  const Vec3f d = at - s.corner;
-  const float du = dot(d, s.u), dv = dot(d, s.v);
-  const float x = (vv * du - uv * dv) / det - 0.5f, y = (uu * dv - uv * du) / det - 0.5f;
+  const Vec2f along = s.along_edges(at);
+  const float x = along.x - 0.5f, y = along.y - 0.5f;
   return x * x + y * y <= 0.25f;
 }
 
@@ -101,7 +99,7 @@ NearLights::NearLights(const LightSampler& sampler, uint64_t lights, double clam
     const auto shape = sampler.shape(i);
     if (!shape) continue;
     boxes[i] = shape->bounds();
-    const double cell = sampler.cell(i, lights);
+    const double cell = sampler.cell(i, *shape, lights);
     reach2[i] = distance > 0.0f ? distance * distance : static_cast<float>(clamp_lights * cell * std::numbers::inv_pi);
     power[i] = static_cast<float>(static_cast<double>(shape->area) / cell);
     if (reach2[i] > 0.0f && power[i] > 0.0f) order_.push_back(static_cast<uint32_t>(i));
@@ -142,8 +140,7 @@ void NearLights::build(uint32_t node, uint32_t begin, uint32_t end, const Progre
     nodes_[node].first = begin, nodes_[node].count = end - begin;
     return;
   }
-  const Vec3f size = centres.extent();
-  const int axis = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
+  const int axis = centres.longest_axis();
   const uint32_t middle = begin + (end - begin) / 2;
   std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end, [&](uint32_t a, uint32_t b) {
     const float x = boxes_[a].center()[axis], y = boxes_[b].center()[axis];
@@ -168,6 +165,13 @@ float NearLights::emitter_importance(uint32_t slot, const Vec3f& position) const
   return importance(boxes_[slot], power_[slot], reach2_[slot], position);
 }
 
+std::optional<float> NearLights::share_of_first(const Node& parent, const Vec3f& position) const {
+  const Node &a = nodes_[parent.first], &b = nodes_[parent.first + 1];
+  const float wa = importance(a.box, a.power, a.reach2, position), wb = importance(b.box, b.power, b.reach2, position);
+  if (!(wa + wb > 0.0f)) return {};
+  return wa / (wa + wb);
+}
+
 bool NearLights::near(const Vec3f& position) const {
   return !nodes_.empty() && nodes_[0].box.dist2(position) < nodes_[0].reach2;
 }
@@ -177,11 +181,9 @@ std::optional<NearLights::Sample> NearLights::sample(const Vec3f& position, floa
   double chance = 1.0;
   uint32_t n = 0;
   while (nodes_[n].count == 0) {
-    const Node &a = nodes_[nodes_[n].first], &b = nodes_[nodes_[n].first + 1];
-    const float wa = importance(a.box, a.power, a.reach2, position),
-                wb = importance(b.box, b.power, b.reach2, position);
-    if (!(wa + wb > 0.0f)) return {};
-    const float share = wa / (wa + wb);
+    const std::optional<float> first_share = share_of_first(nodes_[n], position);
+    if (!first_share) return {};
+    const float share = *first_share;
     const bool left = choice < share;
     choice = left ? choice / share : (choice - share) / (1.0f - share);
     choice = std::clamp(choice, 0.0f, 0x1.fffffep-1f);
@@ -217,7 +219,7 @@ std::optional<NearLights::Sample> NearLights::sample(const Vec3f& position, floa
   if (!(cosine > 0.0)) return {};
   // A solid angle of 1/density covers that much of its surface.
   const double area = static_cast<double>(d2) / (s.density * cosine);
-  s.vpl = sampler_.place_on(emitter, place->at, position, static_cast<float>(area), s.offset);
+  s.vpl = sampler_.place_on(emitter, shape, place->at, position, static_cast<float>(area), s.offset);
   s.vpl.intensity *= lost;
   return s;
 }
@@ -232,11 +234,9 @@ NearLights::Found NearLights::found(const Vec3f& position, uint32_t emitter, flo
   for (uint32_t k = 0; k < leaf.count; ++k) sum += emitter_importance(leaf.first + k, position);
   double chance = sum > 0.0f ? static_cast<double>(emitter_importance(slot, position) / sum) : 0.0;
   for (uint32_t n = leaf_of_[emitter]; n != 0; n = nodes_[n].parent) {
-    const uint32_t first = nodes_[nodes_[n].parent].first;
-    const Node &a = nodes_[first], &b = nodes_[first + 1];
-    const float wa = importance(a.box, a.power, a.reach2, position),
-                wb = importance(b.box, b.power, b.reach2, position);
-    chance *= wa + wb > 0.0f ? static_cast<double>((n == first ? wa : wb) / (wa + wb)) : 0.0;
+    const Node& parent = nodes_[nodes_[n].parent];
+    const std::optional<float> share = share_of_first(parent, position);
+    chance *= share ? static_cast<double>(n == parent.first ? *share : 1.0f - *share) : 0.0;
   }
   return {lost, chance};
 }

@@ -53,6 +53,8 @@ class NearLights {
   };
   void build(uint32_t node, uint32_t begin, uint32_t end, const Progress& progress);
   static float importance(const Aabb& box, float power, float reach2, const Vec3f& position);
+  // The chance of an inner node's first child; empty where the clamp takes nothing from either.
+  std::optional<float> share_of_first(const Node& parent, const Vec3f& position) const;
   float emitter_importance(uint32_t slot, const Vec3f& position) const;
   // `density`: the chance of the emitter alone.
   Found found(const Vec3f& position, uint32_t emitter, float distance) const;

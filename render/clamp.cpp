@@ -34,8 +34,9 @@ float Clamp::from_spacing2(float spacing) const {
                             static_cast<double>(LightSpacing::kNeighbour));
 }
 
-void Clamp::set_on(VplSet& set) const {
+void Clamp::set_on(VplSet& set, const Progress& progress) const {
   parallel_chunks(set.lights.size(), 1024, [&](size_t begin, size_t end) {
+    progress.check();
     BallQueryTree::Scratch scratch;
     for (size_t i = begin; i < end; ++i) {
       Vpl& v = set.lights[i];

@@ -15,8 +15,8 @@ class Clamp {
   // For these lights, where they lie on their surfaces. Throws Error(cancelled).
   Clamp(const VplSet& set, const CommonParams& params, const Scene& scene, const Progress& progress);
 
-  // Gives each light of the set its own.
-  void set_on(VplSet& set) const;
+  // Gives each light of the set its own. Throws Error(cancelled).
+  void set_on(VplSet& set, const Progress& progress) const;
   // Squared distance of a virtual light that light paths put at this place.
   float at2(const Vec3f& position, BallQueryTree::Scratch& scratch) const;
   // How many of `count` lights lie within it, where it follows their spacing; 0: one distance for all. `clamp_lights` of

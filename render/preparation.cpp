@@ -17,7 +17,7 @@ void Prepared::place_lights(LightSource source, const Progress& progress) {
   const CommonParams& common = params->common();
   clamp = std::make_unique<const Clamp>(*vpls, common, *scene, progress);
   standing_off = off_surfaces(*vpls, *scene);
-  clamp->set_on(standing_off);
+  clamp->set_on(standing_off, progress);
   standing_off.profiles.prefer(scene->profiles());
   // One distance for all, without compensation, clamps direct light too, as in the papers.
   const double within = clamp->lights_on_emitters(vpls->extended);

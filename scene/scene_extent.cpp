@@ -37,8 +37,7 @@ Aabb bounds_of(std::span<const Aabb> boxes) {
 bool split(std::vector<Aabb>& boxes, Range& range, Range& second) {
   Aabb centres;
   for (size_t i = range.begin; i < range.end; ++i) centres.extend(boxes[i].center());
-  const Vec3f size = centres.extent();
-  const int axis = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
+  const int axis = centres.longest_axis();
   const float middle = centres.center()[axis];
   const auto begin = boxes.begin() + static_cast<std::ptrdiff_t>(range.begin),
              end = boxes.begin() + static_cast<std::ptrdiff_t>(range.end);

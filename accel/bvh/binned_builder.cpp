@@ -83,7 +83,7 @@ class BinnedBuilder {
   // Partitions items_[begin, end) at the cheapest bin boundary; the index of the first item on the right.
   size_t split(size_t begin, size_t end, const Aabb& centres) {
     const Vec3f extent = centres.extent();
-    const int longest = extent.x >= extent.y && extent.x >= extent.z ? 0 : (extent.y >= extent.z ? 1 : 2);
+    const int longest = centres.longest_axis();
     float best = std::numeric_limits<float>::max();
     int best_axis = -1, best_bin = 0;
     struct Bin {
