@@ -42,6 +42,7 @@ Bsdf::Bsdf(const BsdfParameters& parameters, const SurfaceView& view)
     p.specular = parameters.specular * cosine_lobe_scale(parameters.model == LobeModel::phong, parameters.exponent);
     p.shape = parameters.exponent;
     diffuse_color_ = parameters.diffuse, specular_color_ = parameters.specular;
+    add_other_side();
     return;
   }
   colors_ = ggx_colors(parameters);
@@ -54,41 +55,70 @@ Bsdf::Bsdf(const BsdfParameters& parameters, const SurfaceView& view)
   p.falloff = diffuse.falloff;
   p.lobe = kLobe<GgxReflection>, p.shape = std::max(kLeastAlpha, colors_.alpha);
   if (colors_.alpha >= kLeastAlpha) p.specular = colors_.specular, p.grazing = colors_.grazing;
-  if (!(parameters.coat > 0.0f)) return;
-  const ClearCoat coat = clear_coat(parameters);
-  dim_by_coat(coat, cosine, p);
-  if (smooth_coat(parameters.coat, parameters.coat_alpha)) return;
-  SurfacePoint& above = layers_[layer_count_++];
-  above.position = p.position, above.normal = p.normal, above.mirror = p.mirror, above.pixel = p.pixel;
-  above.lobe = kLobe<GgxReflection>, above.shape = coat.alpha;
-  above.specular = Rgb{1, 1, 1} * coat.f0, above.grazing = Rgb{1, 1, 1} * coat.f90;
+  if (parameters.coat > 0.0f) {
+    const ClearCoat coat = clear_coat(parameters);
+    dim_by_coat(coat, cosine, p);
+    if (!smooth_coat(parameters.coat, parameters.coat_alpha)) {
+      SurfacePoint& above = layers_[layer_count_++];
+      above.position = p.position, above.normal = p.normal, above.mirror = p.mirror, above.pixel = p.pixel;
+      above.lobe = kLobe<GgxReflection>, above.shape = coat.alpha;
+      above.specular = Rgb{1, 1, 1} * coat.f0, above.grazing = Rgb{1, 1, 1} * coat.f90;
+    }
+  }
+  add_other_side();
+}
+
+// What passes evenly is a Lambert point on the other side: kernels and bounds know nothing of it.
+void Bsdf::add_other_side() {
+  if (!translucent()) return;
+  SurfacePoint& other = layers_[layer_count_++];
+  other.position = origin(kTransmitted);
+  other.normal = other.mirror = -normal_;
+  other.diffuse = parameters_.translucency * kInvPi;
+  other.pixel = layers_[0].pixel;
 }
 
 Rgb Bsdf::evaluate(const Vec3f& to_light) const {
   Rgb f{};
-  for (const SurfacePoint& p : layers()) f += reflectance(p, to_light);
+  for (const SurfacePoint& p : layers())
+    if (!translucent() || dot(p.normal, to_light) > 0.0f) f += reflectance(p, to_light);
   return f;
 }
 
-// Chance to choose the layer above.
-float Bsdf::coat_share() const {
-  if (layer_count_ < 2) return 0.0f;
-  const float above = largest_albedo(layers_[1]), beneath = largest_albedo(layers_[0]);
-  return above / (above + beneath);
+std::array<float, 3> Bsdf::layer_shares() const {
+  std::array<float, 3> shares{};
+  float sum = 0.0f;
+  for (size_t i = 0; i < layer_count_; ++i) sum += shares[i] = layer_count_ > 1 ? largest_albedo(layers_[i]) : 1.0f;
+  for (float& share : shares) share = sum > 0.0f ? share / sum : 0.0f;
+  return shares;
+}
+
+// The layer that a number in [0, 1) falls to, from the last to the first.
+size_t Bsdf::layer_at(const std::array<float, 3>& shares, float choice) const {
+  size_t layer = layer_count_ - 1;
+  while (layer > 0 && choice >= shares[layer]) choice -= shares[layer--];
+  return layer;
 }
 
 float Bsdf::pdf(const Vec3f& direction) const {
-  const float share = coat_share(), beneath = PointBsdf(layers_[0]).pdf(direction);
-  return share > 0.0f ? share * PointBsdf(layers_[1]).pdf(direction) + (1.0f - share) * beneath : beneath;
+  const auto shares = layer_shares();
+  float sum = 0.0f;
+  for (size_t i = 0; i < layer_count_; ++i)
+    if (dot(layers_[i].normal, direction) > 0.0f) sum += shares[i] * PointBsdf(layers_[i]).pdf(direction);
+  return sum;
 }
 
 std::optional<BsdfSample> Bsdf::sample(float layer, float choice, float u, float v) const {
-  auto s = PointBsdf(layers_[layer < coat_share() ? 1 : 0]).sample(choice, u, v);
+  const size_t chosen = layer_at(layer_shares(), layer);
+  auto s = PointBsdf(layers_[chosen]).sample(choice, u, v);
   if (!s || layer_count_ < 2) return s;
+  s->flags = side_of(chosen);
   s->pdf = pdf(s->direction);
-  s->weight = evaluate(s->direction) * (std::max(0.0f, dot(normal_, s->direction)) / s->pdf);
+  s->weight = evaluate(s->direction) * (std::max(0.0f, dot(layers_[chosen].normal, s->direction)) / s->pdf);
   return s;
 }
+
+Rgb Bsdf::passed_intensity(const Rgb& flux) const { return flux * parameters_.translucency * kInvPi; }
 
 Rgb Bsdf::lambertian_intensity(const Rgb& flux) const {
   if (parameters_.model != LobeModel::ggx) return flux * parameters_.diffuse * kInvPi;
@@ -160,13 +190,13 @@ std::optional<BsdfSample> Bsdf::sample_specular(float choice, float u, float v) 
 }
 
 std::optional<ScatterSample> Bsdf::scatter(Rng& rng) const {
-  if (parameters_.model != LobeModel::ggx) return scatter_cosine(rng);
+  if (parameters_.model != LobeModel::ggx && !translucent()) return scatter_cosine(rng);
   const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float(), lobe = rng.next_float();
   const auto specular = sample_specular(lobe, u, v);
   const float q_specular = specular ? std::min(1.0f, max_component(specular->weight)) : 0.0f;
-  const bool two = layer_count_ > 1;
-  const float beneath = largest_albedo(layers_[0]), above = two ? largest_albedo(layers_[1]) : 0.0f;
-  const float q_layers = std::min(1.0f, beneath + above);
+  float reflected = 0.0f;
+  for (const SurfacePoint& p : layers()) reflected += largest_albedo(p);
+  const float q_layers = std::min(1.0f, reflected);
   const float survive = std::min(1.0f, q_specular + q_layers);
   if (!(choice < survive)) return {};
   const float p_specular = survive * q_specular / (q_specular + q_layers);
@@ -178,12 +208,12 @@ std::optional<ScatterSample> Bsdf::scatter(Rng& rng) const {
     const float narrowed = refracted ? 1.0f / (ratio * ratio) : 1.0f;
     return ScatterSample{specular->direction, specular->weight, narrowed / p_specular, specular->flags};
   }
-  const float share = two ? above / (above + beneath) : 0.0f;
-  const bool coat = two && rng.next_float() < share;
-  const auto s = PointBsdf(layers_[coat ? 1 : 0]).sample(lobe, u, v);
-  if (!s || dot(s->direction, side_) < 0.0f) return {};
-  return ScatterSample{s->direction, s->weight, 1.0f / ((survive - p_specular) * (coat ? share : 1.0f - share)),
-                       s->flags};
+  const auto shares = layer_shares();
+  const size_t layer = layer_count_ > 1 ? layer_at(shares, rng.next_float()) : 0;
+  const auto s = PointBsdf(layers_[layer]).sample(lobe, u, v);
+  const uint32_t side = side_of(layer);
+  if (!s || (side == kTransmitted) != (dot(s->direction, side_) < 0.0f)) return {};
+  return ScatterSample{s->direction, s->weight, 1.0f / ((survive - p_specular) * shares[layer]), side};
 }
 
 // Blinn's and Phong's surfaces, by the largest of kd and ks.
@@ -226,10 +256,10 @@ PathChoice Bsdf::choose(Rng& rng) const {
   }
   chosen.layer = layers_.data();
   if (layer_count_ < 2) return chosen;
-  const float share = coat_share();
-  const bool above = rng.next_float() < share;
-  if (above) chosen.layer = &layers_[1];
-  chosen.probability *= above ? share : 1.0f - share;
+  const auto shares = layer_shares();
+  const size_t layer = layer_at(shares, rng.next_float());
+  chosen.layer = &layers_[layer];
+  chosen.probability *= shares[layer];
   return chosen;
 }
 

@@ -44,7 +44,8 @@ class Bsdf {
   Bsdf() = default;
   Bsdf(const BsdfParameters& parameters, const SurfaceView& view);
 
-  // What virtual lights shade, from beneath to above: one point, or two.
+  // What virtual lights shade, from beneath to above, and last the other side of what lets light through evenly: one
+  // point, or up to three.
   std::span<const SurfacePoint> layers() const { return {layers_.data(), layer_count_}; }
   // Whether there is a lobe that rays must follow.
   bool is_specular() const { return specular_; }
@@ -58,9 +59,11 @@ class Bsdf {
   // Of the layers, each chosen by what it reflects; specular lobes have none.
   float pdf(const Vec3f& direction) const;
   // Base colour and F0 together, at most 1: what an albedo pass shows.
-  Rgb albedo() const { return min(diffuse_color_ + specular_color_, Rgb{1, 1, 1}); }
+  Rgb albedo() const { return min(diffuse_color_ + specular_color_ + parameters_.translucency, Rgb{1, 1, 1}); }
   // Intensity of the virtual light that stands for what is reflected evenly of this flux: Lambertian, of the same power.
   Rgb lambertian_intensity(const Rgb& flux) const;
+  // The same for what leaves on the other side; 0 where nothing does.
+  Rgb passed_intensity(const Rgb& flux) const;
 
   // One direction out of the layers, chosen by what they reflect.
   std::optional<BsdfSample> sample(float layer, float choice, float u, float v) const;
@@ -77,11 +80,19 @@ class Bsdf {
 
  private:
   std::optional<ScatterSample> scatter_cosine(Rng& rng) const;
-  float coat_share() const;
+  void add_other_side();
+  size_t layer_at(const std::array<float, 3>& shares, float choice) const;
+  // Each layer's chance: by what it reflects.
+  std::array<float, 3> layer_shares() const;
+  bool translucent() const { return max_component(parameters_.translucency) > 0.0f; }
+  // Which side a layer's light leaves on.
+  uint32_t side_of(size_t layer) const {
+    return translucent() && layer + 1 == layer_count_ ? kTransmitted : kReflected;
+  }
 
   BsdfParameters parameters_;
   GgxColors colors_{};
-  std::array<SurfacePoint, 2> layers_;
+  std::array<SurfacePoint, 3> layers_;
   uint32_t layer_count_ = 0;
   bool specular_ = false, behind_ = false;
   Vec3f position_, side_, normal_, to_viewer_;  // both normals on the viewer's side; `side_` is the geometric one

@@ -14,6 +14,7 @@ struct BsdfParameters {
   LobeModel model = LobeModel::blinn;
   Rgb diffuse{},
       specular{};         // kd and ks; GGX: base colour, and factor of the dielectric's F0 (or F0 without `fresnel`)
+  Rgb translucency{};     // what is passed on evenly to the other side
   float exponent = 0.0f;  // Blinn, Phong
   // GGX alone.
   bool fresnel = true;

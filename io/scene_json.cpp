@@ -254,6 +254,7 @@ class SceneReader {
     };
     colour("diffuse", m.diffuse, most("diffuse_texture", m.diffuse_texture));
     colour("specular", m.specular, most("specular_texture", m.specular_texture));
+    colour("translucency", m.translucency, most("translucency_texture", m.translucency_texture));
     colour("emission", m.emission, 1e15);
     if (auto opacity = object.find("opacity")) m.opacity = std::max(kHole, static_cast<float>(opacity->number(0, 1)));
     if (auto model = object.find("model")) {
@@ -316,6 +317,7 @@ class SceneReader {
     texture("specular_texture", m.specular_texture, TextureUse::colour);
     texture("opacity_texture", m.opacity_texture, TextureUse::mask);
     texture("emission_texture", m.emission_texture, TextureUse::colour);
+    texture("translucency_texture", m.translucency_texture, TextureUse::colour);
     texture("normal_texture", m.normal_texture, TextureUse::vectors);
     if (auto strength = object.find("normal_strength"))
       m.normal_strength = static_cast<float>(strength->number(1e-3, 10));

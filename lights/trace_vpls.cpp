@@ -55,6 +55,8 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
       light.group = path.group;
       light.intensity = at.bsdf.lambertian_intensity(path.flux);
       if (max_component(light.intensity) > 0.0f && is_finite(light.intensity)) vpls.push_back({ids[i], light});
+      light.intensity = at.bsdf.passed_intensity(path.flux), light.normal = -light.normal;
+      if (max_component(light.intensity) > 0.0f && is_finite(light.intensity)) vpls.push_back({ids[i], light});
       const auto next = at.bsdf.scatter(path.rng);
       if (!next) continue;
       path.origin = at.bsdf.origin(next->flags), path.direction = next->direction;

@@ -86,6 +86,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   constexpr float kLargestFactor = 1e6f;
   c.range("diffuse", in.diffuse, 0.0f, in.diffuse_texture > 0 ? kLargestFactor : 1.0f);
   c.range("specular", in.specular, 0.0f, in.specular_texture > 0 ? kLargestFactor : 1.0f);
+  c.range("translucency", in.translucency, 0.0f, in.translucency_texture > 0 ? kLargestFactor : 1.0f);
   c.range("shininess", in.shininess, 0.0f, 1e6f);
   c.range("opacity", in.opacity, 0.0f, 1.0f);
   c.not_negative("emission", in.emission);
@@ -124,6 +125,8 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   m.metallic_texture = texture_index(c, "metallic_texture", in.metallic_texture);
   m.opacity_texture = texture_index(c, "opacity_texture", in.opacity_texture);
   m.emission_texture = texture_index(c, "emission_texture", in.emission_texture);
+  m.translucency = vec(in.translucency);
+  m.translucency_texture = texture_index(c, "translucency_texture", in.translucency_texture);
   return m;
 }
 
@@ -522,7 +525,7 @@ std::vector<uint64_t> append_points(const Scene& scene, const lumicut_point* poi
     const lumicut_point& p = points[i];
     const Vec3f position = vec(p.position), geometric = normalize(vec(p.geometric_normal)),
                 normal = normalize(vec(p.normal)), to_viewer = normalize(vec(p.to_viewer));
-    if (scene.coated()) starts.push_back(out.size());
+    if (scene.most_layers() > 1) starts.push_back(out.size());
     const Bsdf bsdf = scene.bsdf({position, geometric, normal, to_viewer, scene.offset_at(position), p.pixel},
                                  p.material, {p.u, p.v});
     for (const SurfacePoint& point : bsdf.layers()) out.push(point);

@@ -68,7 +68,9 @@ class Batch {
     sums_.resize(pixels_.size());
     std::vector<SurfacePoint> found(pixels_.size() * samples);
     std::vector<uint8_t> hit(found.size(), 0);
-    std::vector<std::optional<SurfacePoint>> coats(scene_.coated() ? found.size() : 0);
+    const size_t most_further = scene_.most_layers() - 1;
+    std::vector<SurfacePoint> further(most_further * found.size());  // layers after the first
+    std::vector<uint8_t> further_count(most_further > 0 ? found.size() : 0, 0);
     std::vector<std::optional<ChainRay>> chain(light_surfaces_ != nullptr ? found.size() : 0);
     parallel_chunks(pixels_.size(), std::max<size_t>(1, 1024 / samples), [&](size_t begin, size_t end) {
       if (context.progress.cancelled()) return;
@@ -88,7 +90,10 @@ class Batch {
         first_hit(seen, p, cosines[i]);
         const auto layers = seen.bsdf.layers();
         hit[at] = 1, found[at] = layers[0];
-        if (layers.size() > 1) coats[at] = layers[1];
+        if (layers.size() > 1) {
+          further_count[at] = static_cast<uint8_t>(layers.size() - 1);
+          std::copy(layers.begin() + 1, layers.end(), further.begin() + static_cast<ptrdiff_t>(most_further * at));
+        }
         if (seen.bsdf.is_specular()) chain[at] = start_chain_of(seen.bsdf, p, i % samples);
       }
     });
@@ -98,9 +103,10 @@ class Batch {
       if (i % 65536 == 0) context.progress.check();
       if (hit[i] == 0) continue;
       points_.push(found[i]);
-      if (coats.empty()) continue;
-      coat_.push_back(false);
-      if (coats[i]) points_.push(*coats[i]), coat_.push_back(true);
+      if (most_further == 0) continue;
+      further_.push_back(false);
+      for (size_t k = 0; k < further_count[i]; ++k)
+        points_.push(further[most_further * i + k]), further_.push_back(true);
     }
     points_.finish();
     std::vector<ChainRay> rays;
@@ -124,7 +130,7 @@ class Batch {
     ShadePoints white;
     white.reserve(points_.size());
     for (size_t i = 0; i < points_.size(); ++i) {
-      if (!coat_.empty() && coat_[i]) continue;  // its place has a point of its own
+      if (!further_.empty() && further_[i]) continue;  // its place has a point of its own
       SurfacePoint point = points_.get(i);
       point.diffuse = Rgb{1, 1, 1} * std::numbers::inv_pi_v<float>, point.specular = point.grazing = {};
       point.lobe = kCosineLobe, point.shape = point.falloff = 0.0f;
@@ -277,7 +283,7 @@ class Batch {
   std::vector<Pixel> pixels_;
   std::vector<PixelSums> sums_;
   ShadePoints points_;
-  std::vector<bool> coat_;               // of each point, where the scene has any: whether it is a coat's lobe
+  std::vector<bool> further_;            // of each point, where the scene has any: whether its place has one before it
   TracedPoints seen_;                    // by way of mirrors and glass
   std::vector<std::vector<Rgb>> light_;  // of each method: reflected, summed over a pixel's samples
   std::vector<float> illuminance_;       // summed over a pixel's samples

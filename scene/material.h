@@ -14,6 +14,7 @@ namespace lumicut {
 struct Material {
   Rgb diffuse{0.8f, 0.8f, 0.8f};
   Rgb specular{};
+  Rgb translucency{};  // share of the light that leaves on the other side, evenly
   float shininess = 0.0f;
   LobeModel lobe = LobeModel::blinn;
   // GGX alone: `diffuse` is the base colour, `specular` multiplies the dielectric's reflectance at normal incidence.
@@ -30,11 +31,13 @@ struct Material {
   int32_t height_texture = -1;
   int32_t roughness_texture = -1, metallic_texture = -1;  // GGX alone; green and blue, as glTF packs them
   int32_t diffuse_texture = -1, specular_texture = -1, opacity_texture = -1, emission_texture = -1;
-  LUMICUT_FIELDS(Material, diffuse, specular, shininess, lobe, fresnel, roughness, metallic, ior, transmission, coat,
-                 coat_roughness, coat_ior, opacity, emission, emit_both_sides, normal_strength, normal_texture,
-                 bump_strength, bump_distance, height_texture, roughness_texture, metallic_texture, diffuse_texture,
-                 specular_texture, opacity_texture, emission_texture)
+  int32_t translucency_texture = -1;
+  LUMICUT_FIELDS(Material, diffuse, specular, translucency, shininess, lobe, fresnel, roughness, metallic, ior,
+                 transmission, coat, coat_roughness, coat_ior, opacity, emission, emit_both_sides, normal_strength,
+                 normal_texture, bump_strength, bump_distance, height_texture, roughness_texture, metallic_texture,
+                 diffuse_texture, specular_texture, opacity_texture, emission_texture, translucency_texture)
 
+  bool translucent() const { return max_component(translucency) > 0.0f; }
   bool emissive() const { return max_component(emission) > 0.0f; }
   float coat_alpha() const { return coat_roughness * coat_roughness; }
   bool rough_coat() const { return lobe == LobeModel::ggx && coat > 0.0f && coat_alpha() >= kLeastAlpha; }

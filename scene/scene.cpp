@@ -88,15 +88,15 @@ void Scene::set_materials(std::vector<Material> materials) {
         if (g && g->ior() == ior) return g;
     return std::shared_ptr<const GlassAlbedo>();
   };
-  bool coated = false;
+  size_t most_layers = 1;
   for (size_t i = 0; i < materials.size(); ++i) {
     const Material& m = materials[i];
-    coated = coated || m.rough_coat();
+    most_layers = std::max(most_layers, size_t{1} + (m.rough_coat() ? 1 : 0) + (m.translucent() ? 1 : 0));
     if (m.lobe != LobeModel::ggx || !(m.transmission > 0.0f) || !(m.roughness > 0.0f)) continue;
     glass[i] = known(m.ior);
     if (!glass[i]) glass[i] = std::make_shared<const GlassAlbedo>(m.ior);
   }
-  glass_ = std::move(glass), coated_ = coated;
+  glass_ = std::move(glass), most_layers_ = most_layers;
   materials_ = std::move(materials);
   committed_ = false;
 }
@@ -160,6 +160,7 @@ void Scene::check_references() const {
     check_texture(materials_[i].specular_texture, i, "specular_texture");
     check_texture(materials_[i].opacity_texture, i, "opacity_texture");
     check_texture(materials_[i].emission_texture, i, "emission_texture");
+    check_texture(materials_[i].translucency_texture, i, "translucency_texture");
     check_texture(materials_[i].normal_texture, i, "normal_texture");
     check_texture(materials_[i].height_texture, i, "height_texture");
     check_texture(materials_[i].roughness_texture, i, "roughness_texture");
@@ -381,6 +382,7 @@ BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv) const {
   BsdfParameters p;
   p.model = m.lobe;
   p.diffuse = texel(m.diffuse, m.diffuse_texture), p.specular = texel(m.specular, m.specular_texture);
+  p.translucency = texel(m.translucency, m.translucency_texture);
   p.exponent = m.shininess;
   if (m.lobe != LobeModel::ggx) return p;
   p.fresnel = m.fresnel;

@@ -77,8 +77,9 @@ class Scene final : private HitFilter {
   // others.
   template <typename Visit>
   void for_each_part(Visit&& visit) const {
-    const auto& [config, textures, materials, glass, coated, meshes, lights, profiles, environment, camera, has_camera,
-                 trace, accel, first_instance, instanced, committed, version, bounds, radius, extent] = *this;
+    const auto& [config, textures, materials, glass, most_layers, meshes, lights, profiles, environment, camera,
+                 has_camera, trace, accel, first_instance, instanced, committed, version, bounds, radius, extent] =
+        *this;
     const bool host_trace = trace != nullptr;
     visit("accel", config);
     visit("host_trace", host_trace);
@@ -132,7 +133,7 @@ class Scene final : private HitFilter {
   // The material's description there, its textures looked up.
   BsdfParameters bsdf_parameters(uint32_t material, Vec2f uv) const;
   // Whether any material has a rough clear coat: points may have two layers.
-  bool coated() const { return coated_; }
+  size_t most_layers() const { return most_layers_; }
   // Whether any material may have a specular lobe.
   bool may_be_specular() const;
   // Radiance emitted by a surface towards `to_viewer`.
@@ -159,7 +160,7 @@ class Scene final : private HitFilter {
   std::vector<Texture> textures_;
   std::vector<Material> materials_;
   std::vector<std::shared_ptr<const GlassAlbedo>> glass_;  // of rough glass; one for each index of refraction
-  bool coated_ = false;
+  size_t most_layers_ = 1;
   std::vector<Mesh> meshes_;
   std::vector<Light> lights_;
   LightProfiles profiles_;

@@ -188,7 +188,10 @@ class Writer:
             out["height_texture"] = self.texture(m.height_texture, "vectors")
             for key in ("bump_distance", "bump_strength"):
                 out[key] = numbers([getattr(m, key)])[0]
-        for slot, use in (("diffuse", "colour"), ("specular", "colour"), ("emission", "colour"), ("opacity", "mask")):
+        if any(m.translucency):
+            out["translucency"] = numbers(m.translucency)
+        for slot, use in (("diffuse", "colour"), ("specular", "colour"), ("translucency", "colour"), ("emission", "colour"),
+                          ("opacity", "mask")):
             number = getattr(m, slot + "_texture")
             if number:
                 out[slot + "_texture"] = self.texture(number, use)

@@ -140,7 +140,8 @@ class Material(Descriptor):
                 ("transmission", c_float), ("normal_texture", c_int32), ("normal_strength", c_float),
                 ("height_texture", c_int32), ("bump_distance", c_float), ("bump_strength", c_float),
                 ("roughness_texture", c_int32), ("metallic_texture", c_int32), ("coat", c_float),
-                ("coat_roughness", c_float), ("coat_ior", c_float)]
+                ("coat_roughness", c_float), ("coat_ior", c_float), ("translucency", c_float * 3),
+                ("translucency_texture", c_int32)]
 
 
 class Mesh(Descriptor):
@@ -205,7 +206,7 @@ class ChannelInfo(Descriptor):
 
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
 SIZES = {Ray: 48, Hit: 32, Rayhit: 80, Vpl: 64, Point: 64, DeviceDesc: 32, Status: 64, AccelDesc: 80, AccelInfo: 80,
-         AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 32, Material: 124, Mesh: 88, Light: 116, Profile: 40,
+         AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 32, Material: 140, Mesh: 88, Light: 116, Profile: 40,
          Environment: 64, Camera: 92, IntegratorInfo: 88, ParamInfo: 72, RenderDesc: 72, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32

@@ -97,6 +97,7 @@ class Surface:
     glass: Value = ZERO  # of what passes two borders
     coat: Value = ZERO   # reflectance at normal incidence
     gloss: Value = ZERO  # reflectance at every angle
+    translucency: Value = ZERO  # what leaves evenly on the other side
     roughness: float = 0.5
     ior: float = 1.5
     emission: Value = ZERO
@@ -153,7 +154,7 @@ class SurfaceReader(Evaluator):
             self.note("roughness", "Textures taken as their mean")
 
         def weight(h, s):
-            return h.scalar() * sum(luminance(getattr(s, slot)) for slot in ("diffuse", "metal", "glass", "coat", "gloss"))
+            return h.scalar() * sum(luminance(getattr(s, slot)) for slot in ("diffuse", "metal", "glass", "coat", "gloss", "translucency"))
 
         by_place = None
         if a.by_place or b.by_place:
@@ -169,7 +170,7 @@ class SurfaceReader(Evaluator):
             clearcoat = ClearCoat(min(1.0, whole), sum(h * c.share * c.roughness for h, c in coats) / whole,
                                   max(coats, key=lambda x: x[0] * x[1].share)[1].ior)
         summed = {slot: self.add(self.multiply(f, getattr(a, slot)), self.multiply(g, getattr(b, slot)))
-                  for slot in ("diffuse", "metal", "glass", "coat", "gloss", "emission", "opacity")}
+                  for slot in ("diffuse", "metal", "glass", "coat", "gloss", "translucency", "emission", "opacity")}
         return Surface(roughness=roughness, ior=a.ior if luminance(a.glass) > luminance(b.glass) else b.ior,
                        rough_picture=picture, by_place=by_place, clearcoat=clearcoat, **summed)
 
@@ -312,12 +313,16 @@ class SurfaceReader(Evaluator):
         self.note(node.bl_label, "Shaders taken as glass, which reflects too")
         return self.closure_bsdf_glass(node, stack)
 
+    def closure_bsdf_translucent(self, node, stack):
+        self.bumps(node, stack)
+        return Surface(translucency=self.value(node.inputs["Color"], stack))
+
     def as_diffuse(self, node, stack):
         self.bumps(node, stack)
         self.note(node.bl_label, "Shaders taken as diffuse")
         return Surface(diffuse=self.value(input_of(node, "Color"), stack))
 
-    closure_bsdf_translucent = closure_subsurface_scattering = as_diffuse
+    closure_subsurface_scattering = as_diffuse
     closure_bsdf_velvet = closure_bsdf_sheen = closure_bsdf_toon = closure_bsdf_hair = closure_bsdf_hair_principled = as_diffuse
 
     def closure_eevee_specular(self, node, stack):
@@ -431,7 +436,7 @@ class Converted:
 
 
 COARSE = "Textures that repeat much against others of their material, at a lower resolution"
-SLOTS = ("diffuse", "specular", "emission", "opacity")
+SLOTS = ("diffuse", "specular", "translucency", "emission", "opacity")
 
 
 class Materials:
@@ -482,7 +487,7 @@ class Materials:
             factors[slot] = np.maximum(np.nan_to_num(value.factor), 0)
             if value.picture is not None:
                 pictures[slot] = value.picture
-        for slot in ("diffuse", "specular"):
+        for slot in ("diffuse", "specular", "translucency"):
             if cut_of(factors[slot], pictures.get(slot)) > 0.07:  # white by Burley's albedo goes without saying
                 self.report.note(name, "Colours above 1 cut to 1")
             # With a picture the library cuts the product.

@@ -293,6 +293,48 @@ TEST(Bsdf, SamplesOfALayeredSurfaceWeighItsValueByItsDensity) {
   EXPECT_LE(density, 1.01);
 }
 
+// What passes evenly: value, samples and density over the whole sphere, beside gloss and under a coat.
+TEST(Bsdf, ATranslucentSheetSpreadsWhatItReflectsAndWhatItPassesEachToItsSide) {
+  Material paper, leaf = lacquer(0.5f, 0.4f, 0.6f, 0.3f, {0.4f, 0.3f, 0.2f}), cloth;
+  paper.diffuse = {0.5f, 0.5f, 0.5f}, paper.translucency = {0.2f, 0.4f, 0.3f};
+  leaf.lobe = LobeModel::ggx, leaf.specular = {1, 1, 1}, leaf.translucency = {0.1f, 0.5f, 0.1f};
+  cloth.diffuse = {}, cloth.translucency = {0.6f, 0.7f, 0.8f};
+  for (const Material& m : {paper, leaf, cloth})
+    for (const float side : {1.0f, -1.0f}) {
+      Scene scene(Scene::Config{});
+      scene.set_materials({m});
+      const Vec3f view = normalize(Vec3f{0.5f, 0.2f, 0.8f * side});
+      const Bsdf bsdf = scene.bsdf({{}, {0, 0, 1}, {0, 0, 1}, view, 1e-5f}, 0, {});
+      const SurfacePoint other = bsdf.layers().back();
+      EXPECT_LT(other.position.z * side, 0.0f) << "its shadow rays start on the other side";
+      EXPECT_LT(other.normal.z * side, 0.0f);
+      Rng rng(12, Stage::test);
+      double sampled[2] = {}, integral[2] = {}, density = 0, carried[2] = {};
+      constexpr int kSamples = 200000;
+      for (int i = 0; i < kSamples; ++i) {
+        const float layer = rng.next_float(), choice = rng.next_float(), u = rng.next_float(), v = rng.next_float();
+        if (const auto s = bsdf.sample(layer, choice, u, v)) {
+          const bool passed = s->direction.z * side < 0.0f;
+          ASSERT_EQ((s->flags & kTransmitted) != 0, passed);
+          const float expected = bsdf.evaluate(s->direction).y * std::abs(s->direction.z) / bsdf.pdf(s->direction);
+          ASSERT_NEAR(s->weight.y, expected, 1e-4f * (1 + expected));
+          sampled[passed] += s->weight.y / kSamples;
+        }
+        if (const auto s = bsdf.scatter(rng))
+          carried[s->direction.z * side < 0.0f] += s->weight.y * s->factor / kSamples;
+        const Vec3f d = test::random_direction(rng);
+        integral[d.z * side < 0.0f] += bsdf.evaluate(d).y * std::abs(d.z) * 12.5663706f / kSamples;
+        density += bsdf.pdf(d) * 12.5663706f / kSamples;
+      }
+      EXPECT_NEAR(integral[1], m.translucency.y, 0.01) << "all that is passed, whatever the view";
+      for (int k = 0; k < 2; ++k) {
+        EXPECT_NEAR(sampled[k], integral[k], 0.01);
+        EXPECT_NEAR(carried[k], integral[k], 0.01);
+      }
+      EXPECT_NEAR(density, 1.0, 0.02);
+    }
+}
+
 // The continuation of light paths loses no power on the average: what it carries is what the surface reflects.
 TEST(Bsdf, RouletteKeepsThePowerOfLightPaths) {
   struct Case {

@@ -153,6 +153,8 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
       {[](M& m) { m.ior = 0.05f; }, "lumicut_material[3].ior: 0.05 is not in [0.1, 10]"},
       {[](M& m) { m.transmission = kNan; }, "lumicut_material[3].transmission: nan is not in [0, 1]"},
       {[](M& m) { m.height_texture = -2; }, "lumicut_material[3].height_texture: -2"},
+      {[](M& m) { m.translucency[2] = 1.5f; }, "lumicut_material[3].translucency[2]: 1.5 is not in [0, 1]"},
+      {[](M& m) { m.translucency_texture = -2; }, "lumicut_material[3].translucency_texture: -2"},
       {[](M& m) { m.bump_distance = kNan; }, "lumicut_material[3].bump_distance: nan is not in [-1e+06, 1e+06]"},
       {[](M& m) { m.bump_strength = -1; }, "lumicut_material[3].bump_strength: -1 is not in [0, 10]"},
       {[](M& m) { m.roughness_texture = -1; }, "lumicut_material[3].roughness_texture: -1"},

@@ -82,6 +82,8 @@ std::vector<Change> scene_changes() {
       material("material.transmission", [](M& m) { m.transmission = 0.25f; }),
       material("material.normal_texture", [](M& m) { m.normal_texture = 1; }),
       material("material.normal_strength", [](M& m) { m.normal_strength = 0.5f; }),
+      material("material.translucency_texture", [](M& m) { m.translucency_texture = 1; }),
+      material("material.translucency", [](M& m) { m.translucency[1] = 0.25f; }),
       material("material.height_texture", [](M& m) { m.height_texture = 1; }),
       material("material.bump_distance", [](M& m) { m.bump_distance = 0.5f; }),
       material("material.bump_strength", [](M& m) { m.bump_strength = 0.5f; }),

@@ -1,4 +1,4 @@
-// Glass: virtual lights with compensation, averaged over iterations, give the path tracer's image.
+// Glass, and sheets that pass light evenly: virtual lights with compensation, averaged over iterations, give the path tracer's image.
 #include <gtest/gtest.h>
 
 #include "tests/support/render.h"
@@ -7,7 +7,7 @@
 namespace lumicut {
 namespace {
 
-enum class Glass { none, sheet_out, sheet_in, slab, ball };
+enum class Glass { none, sheet_out, sheet_in, slab, ball, paper };
 
 void add_ball(Mesh& mesh, const Vec3f& center, float radius, uint32_t material) {
   constexpr int kRings = 12, kSegments = 24;
@@ -35,6 +35,10 @@ std::unique_ptr<Scene> make_glass(Glass kind) {
   switch (kind) {
     case Glass::none:
       break;
+    case Glass::paper:  // passes light evenly
+      glass = test::diffuse(0.3f, 0.3f, 0.3f), glass.translucency = {0.5f, 0.4f, 0.6f};
+      scene->set_materials({test::diffuse(0.6f, 0.6f, 0.6f), glass, glowing});
+      [[fallthrough]];
     case Glass::sheet_out:
       test::add_quad(mesh, {-1, 0, -1}, {1, 0, -1}, {1, 0, 1}, {-1, 0, 1}, 1);
       break;
@@ -91,7 +95,8 @@ double mean_of(const std::vector<Rgb>& pixels) {
 
 class OfGlass : public testing::TestWithParam<Glass> {};
 INSTANTIATE_TEST_SUITE_P(Kinds, OfGlass,
-                         testing::Values(Glass::none, Glass::sheet_out, Glass::sheet_in, Glass::slab, Glass::ball));
+                         testing::Values(Glass::none, Glass::sheet_out, Glass::sheet_in, Glass::slab, Glass::ball,
+                                         Glass::paper));
 
 TEST_P(OfGlass, CompensatedIterationsGiveThePathTracersImage) {
   const auto scene = make_glass(GetParam());

@@ -134,6 +134,9 @@ typedef struct lumicut_material {
   float coat;              /* 0..1: share of a clear coat above all of it */
   float coat_roughness;    /* 0..1, as roughness */
   float coat_ior;          /* 1..10; 0: not given, taken as 1.5 */
+  /* Any model */
+  float translucency[3];   /* as diffuse: share of the light that leaves evenly on the other side; diffuse + translucency <= 1 keeps energy */
+  int32_t translucency_texture; /* 1 + index; 0: none. Multiplies */
 } lumicut_material;
 enum { LUMICUT_EMIT_BOTH_SIDES = 1, LUMICUT_PHONG = 2, LUMICUT_GGX = 4, LUMICUT_NO_FRESNEL = 8 };
 
