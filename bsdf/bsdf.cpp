@@ -50,18 +50,20 @@ Bsdf::Bsdf(const BsdfParameters& parameters, const SurfaceView& view)
   specular_color_ = colors_.specular;
   specular_ = smooth_coat(parameters.coat, parameters.coat_alpha) || colors_.is_specular();
   const float cosine = set_mirror(to_viewer_, p);
-  const GgxDiffuse diffuse = ggx_diffuse(colors_, cosine);
+  const GgxDiffuse diffuse = ggx_diffuse(colors_, parameters.additive, cosine);
   p.diffuse = diffuse.scale * kInvPi;
   p.falloff = diffuse.falloff;
+  p.retro = 2.0f * std::sqrt(colors_.alpha) * diffuse.burley, p.dim = 0.5f * diffuse.burley;
   p.lobe = kLobe<GgxReflection>, p.shape = std::max(kLeastAlpha, colors_.alpha);
+  p.ior = colors_.ior;
   if (colors_.alpha >= kLeastAlpha) p.specular = colors_.specular, p.grazing = colors_.grazing;
   if (parameters.coat > 0.0f) {
-    const ClearCoat coat = clear_coat(parameters);
-    dim_by_coat(coat, cosine, p);
+    const ClearCoat coat = clear_coat(parameters, cosine);
+    if (!parameters.additive) dim_by_coat(coat, p);
     if (!smooth_coat(parameters.coat, parameters.coat_alpha)) {
       SurfacePoint& above = layers_[layer_count_++];
       above.position = p.position, above.normal = p.normal, above.mirror = p.mirror, above.pixel = p.pixel;
-      above.lobe = kLobe<GgxReflection>, above.shape = coat.alpha;
+      above.lobe = kLobe<GgxReflection>, above.shape = coat.alpha, above.ior = coat.ior;
       above.specular = Rgb{1, 1, 1} * coat.f0, above.grazing = Rgb{1, 1, 1} * coat.f90;
     }
   }
@@ -122,7 +124,9 @@ Rgb Bsdf::passed_intensity(const Rgb& flux) const { return flux * parameters_.tr
 
 Rgb Bsdf::lambertian_intensity(const Rgb& flux) const {
   if (parameters_.model != LobeModel::ggx) return flux * parameters_.diffuse * kInvPi;
-  return flux * layers_[0].diffuse * mean_diffuse_falloff(layers_[0].falloff);
+  const SurfacePoint& p = layers_[0];
+  const float even = mean_diffuse_falloff(p.falloff);
+  return flux * p.diffuse * (p.burley() ? even * mean_burley_factor(p.retro, p.dim, dot(p.normal, p.mirror)) : even);
 }
 
 std::optional<BsdfSample> Bsdf::sample_specular(float choice, float u, float v) const {
@@ -146,19 +150,19 @@ std::optional<BsdfSample> Bsdf::sample_specular(float choice, float u, float v) 
     const float border = fresnel_reflectance(cosine, ratio, refracted);
     const bool rough = !(alpha < kSmooth) && parameters_.glass != nullptr;
     const float clear = c.clear / (rough ? parameters_.glass->at(behind_, alpha, view.z) : 1.0f);
-    reflected += Rgb{1, 1, 1} * (clear * border);
+    reflected += parameters_.specular_tint * (clear * border);
     // The base colour is that of two borders, as a closed body has them.
     for (int k = 0; k < 3; ++k) passed[k] = clear * (1.0f - border) * std::sqrt(std::max(0.0f, c.base[k]));
   }
   if (alpha < kLeastAlpha) {
-    const float p = schlick_share(cosine);
+    const float p = fresnel_share(cosine, c.ior);
     reflected += c.specular * (1.0f - p) + c.grazing * p;
   }
   float of_coat = 0.0f;
   if (parameters_.coat > 0.0f) {
-    const ClearCoat coat = clear_coat(parameters_);
-    const float shown = coat.transmittance.at(view.z);
-    reflected *= shown, passed *= shown;
+    const ClearCoat coat = clear_coat(parameters_, view.z);
+    const float shown = coat.transmittance.to_viewer;
+    if (!parameters_.additive) reflected *= shown, passed *= shown;
     if (smooth_coat(parameters_.coat, parameters_.coat_alpha))
       of_coat = coat_reflectance(coat, dot(view, half_vector(coat.alpha)));
   }

@@ -18,7 +18,9 @@ struct BsdfParameters {
   float exponent = 0.0f;  // Blinn, Phong
   // GGX alone.
   bool fresnel = true;
-  float alpha = 0.25f;  // roughness²
+  Rgb specular_tint{1, 1, 1};  // of metal at 82 degrees, and of what glass reflects
+  bool additive = false;       // Burley's diffuse, from which the lobes above take nothing
+  float alpha = 0.25f;         // roughness²
   float metallic = 0.0f, ior = 1.5f, transmission = 0.0f;
   float coat = 0.0f, coat_alpha = 0.0f, coat_ior = 1.5f;  // a clear layer over all of this; `coat`: its share
   const GlassAlbedo* glass = nullptr;                     // of that ior, for rough glass

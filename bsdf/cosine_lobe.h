@@ -70,9 +70,9 @@ struct CosineLobe {
   static constexpr bool kFresnel = false, kBoundOverCosine = false, kAroundMirror = true;
 
   // cosⁿβ, 0 from 90 degrees on.
-  static HWY_INLINE LobeValue Value(D d, V exponent, const LobeDirections& at) {
+  static HWY_INLINE LobeValue Value(D d, const LobeNumbers& of, const LobeDirections& at) {
     const V base = hn::Min(hn::Max(at.beta, hn::Set(d, 1e-20f)), hn::Set(d, 1.0f));
-    const V lobe = hn::Exp(d, hn::Max(hn::Mul(exponent, hn::Log(d, base)), hn::Set(d, -80.0f)));
+    const V lobe = hn::Exp(d, hn::Max(hn::Mul(of.shape, hn::Log(d, base)), hn::Set(d, -80.0f)));
     return {hn::IfThenElseZero(hn::Gt(at.beta, hn::Zero(d)), lobe), hn::Zero(d)};
   }
   static HWY_INLINE LobeValue Bound(D d, const LobeCone& cone) {

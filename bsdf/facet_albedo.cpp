@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "bsdf/ggx_reflection.h"
+#include "bsdf/facet_integral.h"
 #include "bsdf/ggx_transmission.h"
 
 namespace lumicut {
@@ -10,25 +10,6 @@ namespace lumicut {
 namespace {
 
 constexpr int kRoughness = 14, kCosines = 16;  // steps in √α and √cosine
-
-// Mean over the visible facets of what `share(view, half vector)` says that comes off them.
-template <typename Share>
-float kept(float alpha, float cosine_to_viewer, const Share& share) {
-  constexpr int kSteps = 20;
-  if (alpha <= 0.0f) return 1.0f;
-  const Vec3f view{std::sqrt(std::max(0.0f, 1.0f - cosine_to_viewer * cosine_to_viewer)), 0.0f, cosine_to_viewer};
-  float sum = 0.0f;
-  for (int i = 0; i < kSteps; ++i)
-    for (int j = 0; j < kSteps; ++j)
-      sum += share(view, sample_visible_normal(view, alpha, (static_cast<float>(i) + 0.5f) / kSteps,
-                                               (static_cast<float>(j) + 0.5f) / kSteps));
-  return sum / (kSteps * kSteps);
-}
-
-float reflected(float alpha, const Vec3f& view, const Vec3f& half) {
-  const float up = reflect(view, half).z;
-  return up > 0.0f ? masking_reflected(alpha * alpha, view.z, up) : 0.0f;
-}
 
 // One row of cosines for each roughness.
 template <typename Entry>
@@ -57,7 +38,8 @@ float look_up(const float* table, float alpha, float cosine) {
 struct MirrorLoss {
   MirrorLoss() {
     fill(of.data(), [](float alpha, float cosine) {
-      return 1.0f - kept(alpha, cosine, [&](const Vec3f& v, const Vec3f& h) { return reflected(alpha, v, h); });
+      return 1.0f - mean_over_facets(alpha, cosine,
+                                     [&](const Vec3f& v, const Vec3f& h) { return unmasked_reflection(alpha, v, h); });
     });
     // In c² all directions of even light count alike.
     constexpr int kSteps = 64;
@@ -86,12 +68,12 @@ GlassAlbedo::GlassAlbedo(float ior) : ior_(ior), table_(2 * kRoughness * kCosine
   for (const bool inside : {false, true}) {
     const float ratio = inside ? 1.0f / ior : ior;
     fill(table_.data() + (inside ? kRoughness * kCosines : 0), [&](float alpha, float cosine_to_viewer) {
-      return kept(alpha, cosine_to_viewer, [&](const Vec3f& view, const Vec3f& h) {
+      return mean_over_facets(alpha, cosine_to_viewer, [&](const Vec3f& view, const Vec3f& h) {
         const float cosine = std::min(1.0f, std::max(0.0f, dot(view, h)));
         float refracted = 0.0f;
         const float border = fresnel_reflectance(cosine, ratio, refracted);
         const float down = view.z / ratio - h.z * (cosine / ratio - refracted);
-        return border * reflected(alpha, view, h) +
+        return border * unmasked_reflection(alpha, view, h) +
                (down > 0.0f ? (1.0f - border) * masking_transmitted(alpha * alpha, down) : 0.0f);
       });
     });

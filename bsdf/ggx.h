@@ -1,4 +1,4 @@
-// What all GGX lobes share: Smith's height-correlated masking, Schlick's Fresnel term, visible half vectors.
+// What all GGX lobes share: Smith's height-correlated masking, visible half vectors.
 // [Walter et al. 2007; Heitz 2014]
 #pragma once
 
@@ -18,11 +18,6 @@ inline bool smooth_coat(float coat, float alpha) { return coat > 0.0f && alpha <
 
 // √(c²(1 − α²) + α²): cosine times √(1 + tan²·α²), of Smith's masking.
 inline float ggx_root(float alpha2, float cosine) { return std::sqrt(cosine * cosine * (1.0f - alpha2) + alpha2); }
-
-inline float schlick_share(float cosine) {
-  const float m = std::min(1.0f, std::max(0.0f, 1.0f - cosine));
-  return (m * m) * (m * m) * m;
-}
 
 // A half vector about +z as seen from `view` (unit, z > 0): by the area it shows. [Heitz 2018]
 inline Vec3f sample_visible_normal(const Vec3f& view, float alpha, float u, float v) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "bsdf/bsdf_parameters.h"
+#include "bsdf/dielectric.h"
 #include "bsdf/ggx.h"
 #include "bsdf/lobe_transmittance.h"
 
@@ -12,13 +13,36 @@ struct GgxColors {
   Rgb base;
   float metal, opaque, clear;  // shares of metal, coated diffuse and glass; sum 1
   Rgb f0;                      // of the dielectric's border
+  float f90;                   // of the same
+  Rgb metal_edge;              // F90 of metal
   Rgb specular;                // F0 of metal and dielectric together
   Rgb grazing;                 // F90 of both
-  float alpha;
+  float alpha, ior;            // of the lobe
 
   // Whether rays follow its lobe, without regard to a clear coat.
   bool is_specular() const { return alpha < kLeastAlpha || clear > 0.0f; }
 };
+
+// Metals go from their colour to white as glass of this index does, to 2 % of what is between: as Schlick's term.
+inline constexpr float kMetalIndex = 1.5f;
+inline constexpr float kMeanShare = 0.054f;  // of that way, over even light from all sides
+
+// What is made to reflect hardly anything straight on has no bright edge either. `factor`: of a dielectric's F0.
+inline float bright_edge(float factor) { return std::min(1.0f, 2.0f * factor); }
+
+// F90 of metal. A tint darkens the colour at 82 degrees, as artists give it: the curve goes through that colour, and keeps
+// the tint from there on, where Kutz et al. (2021) go back to white.
+inline Rgb metal_edge(const Rgb& base, const Rgb& tint) {
+  const float edge = bright_edge(25.0f * max_component(base));
+  if (!(tint.x < 1.0f || tint.y < 1.0f || tint.z < 1.0f)) return Rgb{1, 1, 1} * edge;
+  const float share = fresnel_share(1.0f / 7.0f, kMetalIndex);
+  Rgb colour{};
+  for (int k = 0; k < 3; ++k) {
+    const float there = tint[k] * (base[k] + (edge - base[k]) * share);
+    colour[k] = std::max(0.0f, base[k] + (there - base[k]) / share);
+  }
+  return colour;
+}
 
 inline GgxColors ggx_colors(const BsdfParameters& m) {
   GgxColors c{};
@@ -29,15 +53,15 @@ inline GgxColors ggx_colors(const BsdfParameters& m) {
   c.alpha = m.alpha;
   if (!m.fresnel) {
     c.metal = c.clear = 0.0f, c.opaque = 1.0f;
-    c.specular = c.grazing = m.specular;
+    c.specular = c.grazing = m.specular, c.ior = kMetalIndex;
     return c;
   }
-  const float r = (m.ior - 1.0f) / (m.ior + 1.0f);
-  c.f0 = m.specular * (r * r);
+  c.f0 = m.specular * normal_reflectance(m.ior);
   c.specular = c.base * c.metal + c.f0 * c.opaque;
-  // What hardly reflects has no bright edge either.
-  const auto edge = [](const Rgb& f0) { return std::min(1.0f, 50.0f * max_component(f0)); };
-  c.grazing = Rgb{1, 1, 1} * (edge(c.base) * c.metal + edge(c.f0) * c.opaque);
+  c.f90 = bright_edge(max_component(m.specular));
+  c.metal_edge = metal_edge(c.base, m.specular_tint);
+  c.grazing = c.metal_edge * c.metal + Rgb{1, 1, 1} * (c.f90 * c.opaque);
+  c.ior = max_component(c.f0) * c.opaque > 0.0f ? m.ior : kMetalIndex;
   return c;
 }
 
@@ -46,25 +70,27 @@ inline GgxColors ggx_colors(const BsdfParameters& m) {
 struct GgxDiffuse {
   Rgb scale;      // with the view's factor, without the light's; over π: the BRDF
   float falloff;  // towards grazing light
+  float burley;   // share that is Burley's
 };
 
-// For a surface seen at `cosine`: coats leave the view as much as the light of that cosine; of rough metals the view has
-// what single reflection loses, the light a fit to that with falloff 1. [Kulla, Conty 2017]
-inline GgxDiffuse ggx_diffuse(const GgxColors& c, float cosine) {
+// For a surface seen at `cosine`. The view has what the coat leaves, and what single reflection at rough metal loses, as
+// they are; the light has falloffs that are near to that, with the same mean. [Kulla, Conty 2017]
+inline GgxDiffuse ggx_diffuse(const GgxColors& c, bool additive, float cosine) {
   const float f0 = max_component(c.f0);
-  const LobeTransmittance rest = lobe_transmittance(f0, std::min(1.0f, 50.0f * f0), c.alpha);
-  const Rgb coat = c.base * (c.opaque * rest.at(cosine) / mean_diffuse_falloff(rest.falloff));
-  if (!(c.metal > 0.0f)) return {coat, rest.falloff};
+  const LobeTransmittance rest =
+      additive ? LobeTransmittance{1.0f, 0.0f} : lobe_transmittance(f0, c.f90, c.ior, c.alpha, cosine);
+  const Rgb coat = c.base * (c.opaque * rest.to_viewer / mean_diffuse_falloff(rest.falloff));
+  if (!(c.metal > 0.0f)) return {coat, rest.falloff, additive ? 1.0f : 0.0f};
   const float mean_lost = mean_facet_loss(c.alpha), lost = facet_loss(c.alpha, cosine);
   Rgb metal{};
   for (int k = 0; k < 3; ++k) {
-    const float mean = c.base[k] + (1.0f - c.base[k]) * (1.0f / 21.0f);
+    const float mean = c.base[k] + (c.metal_edge[k] - c.base[k]) * kMeanShare;
     metal[k] =
         c.metal * mean * mean * (1.0f - mean_lost) / (1.0f - mean * mean_lost) * lost / mean_diffuse_falloff(1.0f);
   }
   const float whole = luminance(coat) + luminance(metal);
   const float falloff = whole > 0.0f ? (luminance(coat) * rest.falloff + luminance(metal)) / whole : rest.falloff;
-  return {coat + metal, falloff};
+  return {coat + metal, falloff, additive && whole > 0.0f ? luminance(coat) / whole : 0.0f};
 }
 
 }  // namespace lumicut

@@ -1,8 +1,10 @@
-// Reflection by GGX facets: F·D·V with F = F0 + (F90 − F0)(1 − v·h)⁵. [Walter et al. 2007; Heitz 2014]
+// Reflection by GGX facets: F·D·V, where F goes from F0 to F90 as a dielectric's reflectance does.
+// [Walter et al. 2007; Heitz 2014; Fresnel]
 // Scalar and SIMD forms. The SIMD part is compiled once a target.
 #ifndef LUMICUT_BSDF_GGX_REFLECTION_H_
 #define LUMICUT_BSDF_GGX_REFLECTION_H_
 
+#include "bsdf/dielectric.h"
 #include "bsdf/ggx.h"
 #include "bsdf/shade_points.h"
 
@@ -18,7 +20,7 @@ inline float masking_reflected(float alpha2, float nv, float nl) {
 struct GgxTerms {
   float distribution;  // D(h)
   float visibility;    // masking over 4 (n·v)(n·l)
-  float fresnel;       // (1 − v·h)⁵
+  float half_cosine;   // v·h
 };
 
 // Between the view direction, given by its mirror image `mirror` about `normal`, and `to_light`. The half vector's
@@ -35,15 +37,17 @@ inline GgxTerms ggx_terms(float alpha, const Vec3f& normal, const Vec3f& mirror,
   GgxTerms t;
   t.distribution = a2 * q * q * std::numbers::inv_pi_v<float> / (e * e);
   t.visibility = 0.5f / (nl * ggx_root(a2, nv) + nv * ggx_root(a2, nl));
-  t.fresnel = schlick_share(0.5f * std::sqrt(q));
+  t.half_cosine = 0.5f * std::sqrt(q);
   return t;
 }
 
-// The lobe of a SurfacePoint: shape is α, specular F0, grazing F90. [requirements: bsdf/lobes.h]
+// The lobe of a SurfacePoint: shape is α, specular F0, grazing F90, ior that of the way between them.
+// [requirements: bsdf/lobes.h]
 struct GgxReflection {
   static Rgb value(const SurfacePoint& p, const Vec3f& to_light) {
     const GgxTerms t = ggx_terms(p.shape, p.normal, p.mirror, to_light);
-    return (p.specular * (1.0f - t.fresnel) + p.grazing * t.fresnel) * (t.distribution * t.visibility);
+    const float share = fresnel_share(t.half_cosine, p.ior);
+    return (p.specular * (1.0f - share) + p.grazing * share) * (t.distribution * t.visibility);
   }
   // By visible half vectors. [Heitz 2018]
   static Vec3f sample(const SurfacePoint& p, float u, float v) {
@@ -58,7 +62,7 @@ struct GgxReflection {
     return share * d * 0.5f / (nv + ggx_root(p.shape * p.shape, nv));
   }
   static Rgb albedo(const SurfacePoint& p) {
-    return p.specular + max(p.grazing - p.specular, Rgb{}) * schlick_share(dot(p.normal, p.mirror));
+    return p.specular + max(p.grazing - p.specular, Rgb{}) * fresnel_share(dot(p.normal, p.mirror), p.ior);
   }
   // The largest D·V·(n·l)/cosine: the half vector is turned from the normal by at least half as much as the light from
   // the mirror direction.
@@ -83,6 +87,7 @@ struct GgxReflection {
 #define LUMICUT_BSDF_GGX_REFLECTION_SIMD_
 #endif
 
+#include "bsdf/dielectric.h"
 #include "bsdf/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -95,10 +100,10 @@ struct GgxReflection {
   // A part in 10^4 against the rounding of sharp lobes' angles.
   static constexpr float kSlack = 1.0002f;
 
-  // D·V and (1 − v·h)⁵, as ggx_terms has them. Finite for whatever cosines.
-  static HWY_INLINE LobeValue Value(D d, V alpha, const LobeDirections& at) {
+  // D·V and the share of F90. Finite for whatever cosines.
+  static HWY_INLINE LobeValue Value(D d, const LobeNumbers& of, const LobeDirections& at) {
     const V one = hn::Set(d, 1.0f);
-    const V a2 = hn::Mul(alpha, alpha), rest = hn::Sub(one, a2);
+    const V a2 = hn::Mul(of.shape, of.shape), rest = hn::Sub(one, a2);
     const V3 &normal = at.normal, &mirror = at.mirror, &to_light = at.to_light;
     const V3 w{hn::Sub(to_light.x, mirror.x), hn::Sub(to_light.y, mirror.y), hn::Sub(to_light.z, mirror.z)};
     const V nv = hn::Max(hn::Set(d, 1e-4f), Dot(normal, mirror)), nl = hn::Max(hn::Zero(d), at.cosine),
@@ -111,8 +116,8 @@ struct GgxReflection {
     const V smith = hn::MulAdd(nl, root_v, hn::Mul(nv, root_l));
     const V lobe =
         hn::Div(hn::Mul(hn::Mul(a2, hn::Set(d, 0.15915494309f)), hn::Mul(q, q)), hn::Mul(hn::Mul(e, e), smith));
-    const V m = hn::Max(hn::Zero(d), hn::NegMulAdd(hn::Set(d, 0.5f), hn::Sqrt(q), one)), m2 = hn::Mul(m, m);
-    return {lobe, hn::Mul(hn::Mul(m2, m2), m)};
+    const V half_cosine = hn::Min(one, hn::Mul(hn::Set(d, 0.5f), hn::Sqrt(q)));
+    return {lobe, FresnelShare(d, hn::Max(hn::Set(d, 1e-6f), half_cosine), of.ior)};
   }
 
   // Largest D·V·(n·l) over the cone's cosine, and largest Fresnel term. The half vector is turned from the normal by at
@@ -132,18 +137,17 @@ struct GgxReflection {
     const V root_l = hn::Sqrt(hn::Max(zero, hn::MulAdd(hn::Mul(nl, nl), rest, low2)));
     const V smith = hn::MulAdd(nl, root_v, hn::Mul(nv, root_l));
     const V lobe = hn::Div(hn::Mul(a2, hn::Set(d, 0.15915494309f * kSlack)), hn::Mul(hn::Mul(e, e), smith));
-    return {lobe, BoundOfFresnel(d, cone.beta, cone.view_cosine)};
+    return {lobe, BoundOfFresnel(d, cone)};
   }
 
-  // Largest (1 − v·h)⁵: lights are at most `beta` to the mirror direction and above the horizon, views at least `nv` to
-  // the normal.
-  static HWY_INLINE V BoundOfFresnel(D d, V beta, V nv) {
-    const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-    const V sine = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(nv, nv, one)));
-    const V apart = hn::Min(hn::Add(sine, hn::Set(d, 1e-6f)), hn::Add(beta, hn::Set(d, 1e-6f)));  // −v·l, at most
+  // Largest share of F90: the half vector's cosine v·h is least where v·l is. Lights are at most `beta` to the mirror
+  // direction and above the horizon, views at least `view_cosine` to the normal.
+  static HWY_INLINE V BoundOfFresnel(D d, const LobeCone& cone) {
+    const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), tiny = hn::Set(d, 1e-6f);
+    const V sine = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(cone.view_cosine, cone.view_cosine, one)));
+    const V apart = hn::Min(hn::Add(sine, tiny), hn::Add(cone.beta, tiny));  // −v·l, at most
     const V vh = hn::Sqrt(hn::Max(zero, hn::Mul(hn::Set(d, 0.5f), hn::Sub(one, apart))));
-    const V m = hn::Sub(one, vh), m2 = hn::Mul(m, m);
-    return hn::Mul(hn::Mul(m2, m2), m);
+    return BoundOfFresnelShare(d, vh, cone.ior_low, cone.ior_high);
   }
 
   static HWY_INLINE V Width(D d, V alpha) { return hn::Mul(hn::Set(d, 2.0f), hn::Mul(alpha, alpha)); }

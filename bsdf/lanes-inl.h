@@ -41,15 +41,19 @@ HWY_INLINE V3 Load3(D d, const Vec3f& v, size_t) { return Set3(d, v); }
 HWY_INLINE V Load1(D d, float v, size_t) { return hn::Set(d, v); }
 HWY_INLINE hn::Vec<DU> Load1(DU d, uint32_t v, size_t) { return hn::Set(d, v); }
 
+// A glossy lobe's numbers, as SurfacePoint has them.
+struct LobeNumbers {
+  V shape, ior;
+};
 // What a glossy lobe is evaluated at: unit vectors, and the light's cosines to normal and mirror direction.
 struct LobeDirections {
   const V3 &normal, &mirror, &to_light;
   V cosine, beta;
 };
 // What it is bounded over: lights of at most `cosine` to the normal and `beta` to the mirror direction, shapes from
-// `low` to `high`, views of at least `view_cosine` to the normal.
+// `low` to `high` and indices likewise, views of at least `view_cosine` to the normal.
 struct LobeCone {
-  V cosine, beta, low, high, view_cosine;
+  V cosine, beta, low, high, ior_low, ior_high, view_cosine;
 };
 // lobe · (specular·(1 − fresnel) + grazing·fresnel), without the cosine. 1/sr
 struct LobeValue {

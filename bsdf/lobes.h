@@ -19,7 +19,7 @@
 
 namespace lumicut {
 
-// What a lobe offers in scalar form. It reads normal, mirror, specular, grazing and shape of the point.
+// What a lobe offers in scalar form. It reads normal, mirror, specular, grazing, shape and ior of the point.
 template <class L>
 concept Lobe = requires(const SurfacePoint& p, const Vec3f& direction, float x) {
   // BRDF towards a unit direction, without the cosine, 1/sr; 0 or more above the horizon. Not asked below it.
@@ -79,6 +79,8 @@ auto with_lobe(const SurfacePoint& p, const Fn& fn) {
 #define LUMICUT_BSDF_LOBES_SIMD_
 #endif
 
+#include "bsdf/burley.h"
+#include "bsdf/lambert.h"
 #include "bsdf/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -87,10 +89,10 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 // What a lobe offers in SIMD form. The structs of directions and values stand in bsdf/lanes-inl.h.
 template <class L>
-concept LaneLobe = requires(D d, V x, const LobeDirections& at, const LobeCone& cone) {
+concept LaneLobe = requires(D d, V x, const LobeNumbers& of, const LobeDirections& at, const LobeCone& cone) {
   // Counterpart of the scalar value, and its largest over a cone of directions and a range of shapes. A bound never lies
   // below a value; slack for rounding is its own business.
-  { L::Value(d, x, at) } -> std::same_as<LobeValue>;
+  { L::Value(d, of, at) } -> std::same_as<LobeValue>;
   { L::Bound(d, cone) } -> std::same_as<LobeValue>;
   // Whether its colour goes from `specular` to `grazing`; else fresnel is 0.
   requires std::same_as<decltype(L::kFresnel), const bool>;
@@ -105,9 +107,35 @@ concept LaneLobe = requires(D d, V x, const LobeDirections& at, const LobeCone& 
 
 using LaneLobes = LobeList<LUMICUT_LOBES>;
 
-// What the glossy lobe of each lane is, and its shape. Loops ask once which lobes the lanes have.
+// How the diffuse part of each lane depends on angles.
+struct DiffuseShape {
+  V falloff, retro, dim;
+  bool burley;  // of some lane
+};
+template <class Points>
+HWY_INLINE DiffuseShape LoadDiffuse(D d, const Points& points, size_t p) {
+  const V retro = Load1(d, points.retro, p), dim = Load1(d, points.dim, p);
+  return {Load1(d, points.falloff, p), retro, dim, !hn::AllFalse(d, hn::Gt(hn::Add(retro, dim), hn::Zero(d)))};
+}
+// Of Lambert's part: `view` is n·m.
+HWY_INLINE V DiffuseFactor(D d, const DiffuseShape& s, V view, V cosine, V beta) {
+  const V even = DiffuseFalloff(d, s.falloff, cosine);
+  return s.burley ? hn::Mul(even, BurleyFactor(d, s.retro, s.dim, view, cosine, beta)) : even;
+}
+// Bound of it over lights of at most `cosine` and views of at least `view`, where the rest of a product is bounded with the
+// light's cosine over `steep`. `rise`: the largest k of bsdf/burley.h, at least 0.
+HWY_INLINE V BoundOfDiffuse(D d, V falloff, V rise, V view, V cosine, V steep) {
+  const V even = BoundOfDiffuseFalloff(d, falloff, cosine);
+  const auto rises = hn::Gt(rise, hn::Zero(d));
+  if (hn::AllFalse(d, rises)) return even;
+  const V retro = BoundOfBurleyFactor(d, rise, view, cosine, steep);
+  return hn::IfThenElse(rises, hn::Mul(even, retro), even);
+}
+
+// What the lobes of each lane are, and their numbers. Loops ask once which lobes the lanes have.
 struct LobeShape {
-  V shape;
+  LobeNumbers of;
+  DiffuseShape diffuse;
   hn::Vec<DU> lobe;
   bool some[LaneLobes::kCount];
 };
@@ -117,8 +145,9 @@ HWY_INLINE hn::Mask<D> IsLobe(D d, hn::Vec<DU> lobe) {
   return hn::RebindMask(d, hn::Eq(lobe, hn::Set(du, place_in<L>(LaneLobes{}))));
 }
 template <class... L>
-HWY_INLINE LobeShape ShapeOfAny(LobeList<L...>, D d, V shape, hn::Vec<DU> lobe) {
-  return {shape, lobe, {!hn::AllFalse(d, IsLobe<L>(d, lobe))...}};
+HWY_INLINE LobeShape ShapeOfAny(LobeList<L...>, D d, const LobeNumbers& of, const DiffuseShape& diffuse,
+                                hn::Vec<DU> lobe) {
+  return {of, diffuse, lobe, {!hn::AllFalse(d, IsLobe<L>(d, lobe))...}};
 }
 
 // The lanes' shapes at points [p, p + Lanes(d)), as far as `kLobes` needs them.
@@ -126,9 +155,13 @@ template <Lobes kLobes, class Points>
 HWY_INLINE LobeShape LoadShape(D d, const Points& points, size_t p) {
   const DU du;
   if constexpr (kLobes == Lobes::all)
-    return ShapeOfAny(LaneLobes{}, d, Load1(d, points.shape, p), Load1(du, points.lobe, p));
+    return ShapeOfAny(LaneLobes{}, d, {Load1(d, points.shape, p), Load1(d, points.ior, p)}, LoadDiffuse(d, points, p),
+                      Load1(du, points.lobe, p));
   else
-    return {kLobes == Lobes::cosine ? Load1(d, points.shape, p) : hn::Zero(d), hn::Zero(du), {}};
+    return {{kLobes == Lobes::cosine ? Load1(d, points.shape, p) : hn::Zero(d), hn::Zero(d)},
+            {hn::Zero(d), hn::Zero(d), hn::Zero(d), false},
+            hn::Zero(du),
+            {}};
 }
 
 template <bool kAskLast, LaneLobe L, LaneLobe... Rest>
@@ -136,7 +169,7 @@ HWY_INLINE LobeValue ValueOfAny(LobeList<L, Rest...>, D d, const LobeShape& s, c
   LobeValue value{hn::Zero(d), hn::Zero(d)};
   if constexpr (sizeof...(Rest) > 0) value = ValueOfAny<kAskLast>(LobeList<Rest...>{}, d, s, at);
   if ((kAskLast || sizeof...(Rest) > 0) && !s.some[place_in<L>(LaneLobes{})]) return value;
-  const LobeValue own = L::Value(d, s.shape, at);
+  const LobeValue own = L::Value(d, s.of, at);
   if constexpr (sizeof...(Rest) == 0) return own;
   const auto here = IsLobe<L>(d, s.lobe);
   return {hn::IfThenElse(here, own.lobe, value.lobe), hn::IfThenElse(here, own.fresnel, value.fresnel)};
@@ -146,7 +179,7 @@ HWY_INLINE LobeValue ValueOfAny(LobeList<L, Rest...>, D d, const LobeShape& s, c
 template <Lobes kLobes, bool kAskLast = true>
 HWY_INLINE LobeValue ValueOfLobes(D d, const LobeShape& s, const LobeDirections& at) {
   if constexpr (kLobes == Lobes::cosine)
-    return CosineLobe::Value(d, s.shape, at);
+    return CosineLobe::Value(d, s.of, at);
   else
     return ValueOfAny<kAskLast>(LaneLobes{}, d, s, at);
 }
@@ -191,7 +224,7 @@ template <LaneLobe L>
 HWY_INLINE void SelectExtent(D d, const LobeShape& s, LobeExtent& extent) {
   const auto here = IsLobe<L>(d, s.lobe);
   if constexpr (L::kAroundMirror) extent.around_mirror = hn::Or(extent.around_mirror, here);
-  extent.width = hn::IfThenElse(here, L::Width(d, s.shape), extent.width);
+  extent.width = hn::IfThenElse(here, L::Width(d, s.of.shape), extent.width);
 }
 template <class... L>
 HWY_INLINE LobeExtent ExtentOfAny(LobeList<L...>, D d, const LobeShape& s) {
@@ -202,7 +235,7 @@ HWY_INLINE LobeExtent ExtentOfAny(LobeList<L...>, D d, const LobeShape& s) {
 template <Lobes kLobes>
 HWY_INLINE LobeExtent ExtentOfLobes(D d, const LobeShape& s) {
   if constexpr (kLobes == Lobes::cosine)
-    return {hn::FirstN(d, hn::Lanes(d)), CosineLobe::Width(d, s.shape)};
+    return {hn::FirstN(d, hn::Lanes(d)), CosineLobe::Width(d, s.of.shape)};
   else
     return ExtentOfAny(LaneLobes{}, d, s);
 }

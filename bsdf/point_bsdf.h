@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "bsdf/burley.h"
 #include "bsdf/lambert.h"
 #include "bsdf/lobes.h"
 
@@ -16,7 +17,10 @@ inline Rgb specular_albedo(const SurfacePoint& p) {
 
 // BRDF towards `to_light` (unit), without the cosine.
 inline Rgb reflectance(const SurfacePoint& p, const Vec3f& to_light) {
-  Rgb f = p.diffuse * diffuse_falloff(p.falloff, dot(p.normal, to_light));
+  const float cosine = dot(p.normal, to_light);
+  float even = diffuse_falloff(p.falloff, cosine);
+  if (p.burley()) even *= burley_factor(p, cosine, dot(p.mirror, to_light));
+  Rgb f = p.diffuse * even;
   f += with_lobe(p, [&](auto lobe) { return lobe.value(p, to_light); });
   return f;
 }

@@ -7,7 +7,6 @@
 #define LUMICUT_BSDF_REFLECTANCE_INL_H_
 #endif
 
-#include "bsdf/lambert.h"
 #include "bsdf/lanes-inl.h"
 #include "bsdf/lobes.h"
 
@@ -21,17 +20,17 @@ struct LobeSums {
   V diffuse, specular, grazing;
 };
 
-template <Lobes kLobes, class Points>
-HWY_INLINE LobeSums LobesTowards(D d, const Points& points, size_t p, const V3& normal, const V3& mirror,
-                                 const LobeShape& shape, const V3& to_light) {
+template <Lobes kLobes>
+HWY_INLINE LobeSums LobesTowards(D d, const V3& normal, const V3& mirror, const LobeShape& shape, const V3& to_light) {
   const V zero = hn::Zero(d);
   LobeSums parts{hn::Set(d, 1.0f), zero, zero};
   if constexpr (kLobes != Lobes::none) {
     const V cosine = Dot(normal, to_light);
-    const LobeValue v = ValueOfLobes<kLobes>(d, shape, {normal, mirror, to_light, cosine, Dot(mirror, to_light)});
+    const V beta = Dot(mirror, to_light);
+    const LobeValue v = ValueOfLobes<kLobes>(d, shape, {normal, mirror, to_light, cosine, beta});
     parts.specular = v.lobe;
     if constexpr (kLobes == Lobes::all) {
-      parts.diffuse = DiffuseFalloff(d, Load1(d, points.falloff, p), cosine);
+      parts.diffuse = DiffuseFactor(d, shape.diffuse, Dot(normal, mirror), cosine, beta);
       parts.grazing = hn::Mul(v.lobe, v.fresnel);
       parts.specular = hn::NegMulAdd(v.lobe, v.fresnel, v.lobe);
     }
@@ -45,8 +44,8 @@ HWY_INLINE V3 Reflectance(D d, const Points& points, size_t p, const V3& normal,
   V3 f = Load3(d, points.diffuse, p);
   if constexpr (kLobes != Lobes::none) {
     const V3 specular = Load3(d, points.specular, p);
-    const LobeSums parts = LobesTowards<kLobes>(d, points, p, normal, Load3(d, points.mirror, p),
-                                                LoadShape<kLobes>(d, points, p), to_light);
+    const LobeSums parts =
+        LobesTowards<kLobes>(d, normal, Load3(d, points.mirror, p), LoadShape<kLobes>(d, points, p), to_light);
     if constexpr (kLobes == Lobes::all) {
       const V3 edge = Load3(d, points.grazing, p);
       f = {hn::MulAdd(edge.x, parts.grazing, hn::Mul(f.x, parts.diffuse)),

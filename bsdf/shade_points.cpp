@@ -10,7 +10,7 @@ template <typename Points, typename Fn>
 void for_each_array(Points& p, Fn fn) {
   for (int k = 0; k < 3; ++k)
     fn(p.position[k]), fn(p.normal[k]), fn(p.mirror[k]), fn(p.diffuse[k]), fn(p.specular[k]), fn(p.grazing[k]);
-  fn(p.shape), fn(p.falloff), fn(p.lobe), fn(p.pixel);
+  fn(p.shape), fn(p.ior), fn(p.falloff), fn(p.retro), fn(p.dim), fn(p.lobe), fn(p.pixel);
 }
 }  // namespace
 
@@ -34,7 +34,8 @@ void ShadePoints::push(const SurfacePoint& p) {
     specular[k].push_back(p.specular[k]);
     grazing[k].push_back(p.grazing[k]);
   }
-  shape.push_back(p.shape), falloff.push_back(p.falloff);
+  shape.push_back(p.shape), ior.push_back(p.ior);
+  falloff.push_back(p.falloff), retro.push_back(p.retro), dim.push_back(p.dim);
   lobe.push_back(p.lobe), pixel.push_back(p.pixel);
   lobes_ = std::max(lobes_, p.lobes());
   ++size_;
@@ -48,8 +49,8 @@ void ShadePoints::finish() {
 
 SurfacePoint ShadePoints::get(size_t i) const {
   const auto at = [i](const std::vector<float>(&a)[3]) { return Vec3f{a[0][i], a[1][i], a[2][i]}; };
-  return {at(position), at(normal), at(mirror), at(diffuse), at(specular),
-          at(grazing),  shape[i],   lobe[i],    falloff[i],  pixel[i]};
+  return {at(position), at(normal), at(mirror), at(diffuse), at(specular), at(grazing), shape[i],
+          ior[i],       lobe[i],    falloff[i], retro[i],    dim[i],       pixel[i]};
 }
 
 }  // namespace lumicut

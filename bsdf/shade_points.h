@@ -13,7 +13,7 @@ inline constexpr size_t kLanes = 16;
 inline constexpr size_t round_up_to_lanes(size_t n) { return (n + kLanes - 1) / kLanes * kLanes; }
 
 // Which glossy lobes points have, as far as kernels tell: none; the papers' cosine lobe alone, with neither Fresnel's term
-// nor a falloff of the diffuse part; or any of bsdf/lobes.h. Each stands for those before it too.
+// nor a diffuse part that knows angles; or any of bsdf/lobes.h. Each stands for those before it too.
 enum class Lobes : uint8_t { none, cosine, all };
 inline constexpr uint32_t kCosineLobe = 0;  // its place in the list of bsdf/lobes.h
 
@@ -26,12 +26,15 @@ struct SurfacePoint {
   Rgb specular;        // of the glossy lobe; cosine lobe: its factor before cosⁿβ; GGX: F0, at normal incidence
   Rgb grazing{};       // GGX: F90, at grazing incidence
   float shape = 0.0f;  // of the glossy lobe; cosine lobe: the exponent n; GGX: α = roughness², above 0
-  uint32_t lobe = kCosineLobe;  // which one: its place in the list of bsdf/lobes.h
-  float falloff = 0.0f;         // of the diffuse part towards grazing light (bsdf/lambert.h)
-  uint32_t pixel = 0;           // points of one pixel lie together
+  float ior = 1.5f;    // GGX: of the dielectric whose Fresnel curve leads from specular to grazing
+  uint32_t lobe = kCosineLobe;     // which one: its place in the list of bsdf/lobes.h
+  float falloff = 0.0f;            // of the diffuse part towards grazing light (bsdf/lambert.h)
+  float retro = 0.0f, dim = 0.0f;  // of the diffuse part, as Burley's is (bsdf/burley.h)
+  uint32_t pixel = 0;              // points of one pixel lie together
 
+  bool burley() const { return retro > 0.0f || dim > 0.0f; }
   Lobes lobes() const {
-    if (lobe != kCosineLobe || falloff > 0.0f) return Lobes::all;
+    if (lobe != kCosineLobe || falloff > 0.0f || burley()) return Lobes::all;
     return max_component(specular) > 0.0f ? Lobes::cosine : Lobes::none;
   }
   // All light that it reflects, times `factor`: what a path has lost on its way here.
@@ -40,7 +43,8 @@ struct SurfacePoint {
 
 struct ShadePoints {
   // position, normal, mirror, diffuse, specular, grazing: [component][point]
-  std::vector<float> position[3], normal[3], mirror[3], diffuse[3], specular[3], grazing[3], shape, falloff;
+  std::vector<float> position[3], normal[3], mirror[3], diffuse[3], specular[3], grazing[3], shape, ior, falloff, retro,
+      dim;
   std::vector<uint32_t> lobe, pixel;
 
   size_t size() const { return size_; }

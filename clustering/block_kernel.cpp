@@ -42,7 +42,7 @@ struct BlockKernel {
         const V geometry = Geometry<kKind>(d, light, falloff, position, normal, to_light);
         if constexpr (kLobes == Lobes::all) {
           if (hn::AllFalse(d, hn::Gt(geometry, zero))) continue;
-          const LobeSums parts = LobesTowards<kLobes>(d, points, p, normal, mirror, shape, to_light);
+          const LobeSums parts = LobesTowards<kLobes>(d, normal, mirror, shape, to_light);
           add_to(even, intensity, hn::Mul(geometry, parts.diffuse));
           add_to(lobed, intensity, hn::Mul(geometry, parts.specular));
           add_to(edge, intensity, hn::Mul(geometry, parts.grazing));
@@ -52,7 +52,7 @@ struct BlockKernel {
         if constexpr (kLobes == Lobes::cosine) {
           const V beta = Dot(mirror, to_light);
           if (hn::AllFalse(d, hn::And(hn::Gt(beta, zero), hn::Gt(geometry, zero)))) continue;
-          const LobeSums parts = LobesTowards<kLobes>(d, points, p, normal, mirror, shape, to_light);
+          const LobeSums parts = LobesTowards<kLobes>(d, normal, mirror, shape, to_light);
           add_to(lobed, intensity, hn::Mul(parts.specular, geometry));
         }
       }

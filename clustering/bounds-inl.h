@@ -173,13 +173,16 @@ struct BoundsKernel {
           beta = CosineToBox(d, to_center, half, Load3(d, block.mirror_tangent, i), Load3(d, block.mirror_bitangent, i),
                              mirror);
         const LobeShape shape = LoadShape<kLobes>(d, block, i);
-        const LobeValue bound =
-            BoundOfLobes<kLobes>(d, shape, {cosine, beta, shape.shape, shape.shape, Dot(normal, mirror)}, steep);
+        const LobeNumbers& of = shape.of;
+        const LobeValue bound = BoundOfLobes<kLobes>(
+            d, shape, {cosine, beta, of.shape, of.shape, of.ior, of.ior, Dot(normal, mirror)}, steep);
         V3 color = specular;
         if constexpr (kLobes == Lobes::all) {
           color = BoundOfColor(d, specular, Load3(d, block.grazing, i), bound.fresnel);
-          const V falloff = BoundOfDiffuseFalloff(d, hn::Load(d, block.falloff + i), cosine);
-          f = {hn::Mul(f.x, falloff), hn::Mul(f.y, falloff), hn::Mul(f.z, falloff)};
+          const DiffuseShape& own = shape.diffuse;
+          const V rise = hn::Max(zero, hn::Sub(own.retro, own.dim));
+          const V even = BoundOfDiffuse(d, own.falloff, rise, Dot(normal, mirror), cosine, steep);
+          f = {hn::Mul(f.x, even), hn::Mul(f.y, even), hn::Mul(f.z, even)};
         }
         f = {hn::MulAdd(color.x, bound.lobe, f.x), hn::MulAdd(color.y, bound.lobe, f.y),
              hn::MulAdd(color.z, bound.lobe, f.z)};

@@ -34,7 +34,8 @@ void PointBlock::load(const ShadePoints& points, size_t first) {
       mirror[k][i] = p.mirror[k], mirror_tangent[k][i] = m.t[k], mirror_bitangent[k][i] = m.b[k];
       diffuse[k][i] = p.diffuse[k], specular[k][i] = p.specular[k], grazing[k][i] = p.grazing[k];
     }
-    shape[i] = p.shape, falloff[i] = p.falloff, lobe[i] = p.lobe;
+    shape[i] = p.shape, ior[i] = p.ior, lobe[i] = p.lobe;
+    falloff[i] = p.falloff, retro[i] = p.retro, dim[i] = p.dim;
     lobes = std::max(lobes, p.lobes());
   }
 }

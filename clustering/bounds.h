@@ -13,7 +13,7 @@ struct alignas(64) PointBlock {
   float normal[3][kLanes], tangent[3][kLanes], bitangent[3][kLanes];
   float mirror[3][kLanes], mirror_tangent[3][kLanes], mirror_bitangent[3][kLanes];
   float diffuse[3][kLanes], specular[3][kLanes], grazing[3][kLanes];
-  float shape[kLanes], falloff[kLanes];
+  float shape[kLanes], ior[kLanes], falloff[kLanes], retro[kLanes], dim[kLanes];
   uint32_t lobe[kLanes];
   Lobes lobes = Lobes::none;  // of any of the points
 

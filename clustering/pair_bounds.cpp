@@ -19,7 +19,12 @@ HWY_INLINE V3 Add3(const V3& a, const V3& b) { return {hn::Add(a.x, b.x), hn::Ad
 HWY_INLINE V3 Sub3(const V3& a, const V3& b) { return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)}; }
 
 HWY_INLINE LobeCone ConeOf(D d, const PointNodes::OfLobe& own, size_t i, V cosine, V beta) {
-  return {cosine, beta, hn::Load(d, own.shape_low + i), hn::Load(d, own.shape_high + i),
+  return {cosine,
+          beta,
+          hn::Load(d, own.shape_low + i),
+          hn::Load(d, own.shape_high + i),
+          hn::Load(d, own.ior_low + i),
+          hn::Load(d, own.ior_high + i),
           hn::Load(d, own.view_cosine + i)};
 }
 // A point has one lobe: the largest of their bounds.
@@ -117,8 +122,9 @@ struct PairKernel {
           f = {hn::MulAdd(specular.x, lobe, f.x), hn::MulAdd(specular.y, lobe, f.y), hn::MulAdd(specular.z, lobe, f.z)};
         } else {
           const V3 gloss = LargestGloss(LaneLobes{}, d, nodes, i, cosine, beta, steep);
-          const V falloff = BoundOfDiffuseFalloff(d, hn::Load(d, nodes.falloff + i), cosine);
-          f = {hn::MulAdd(f.x, falloff, gloss.x), hn::MulAdd(f.y, falloff, gloss.y), hn::MulAdd(f.z, falloff, gloss.z)};
+          const V even = BoundOfDiffuse(d, hn::Load(d, nodes.falloff + i), hn::Load(d, nodes.burley_rise + i),
+                                        hn::Load(d, nodes.view_cosine + i), cosine, steep);
+          f = {hn::MulAdd(f.x, even, gloss.x), hn::MulAdd(f.y, even, gloss.y), hn::MulAdd(f.z, even, gloss.z)};
         }
       }
       hn::StoreU(BoundOfLuminance(d, f, geometry, node.intensity), d, bounds + i);
@@ -163,17 +169,22 @@ void PointNodes::set(size_t lane, const ShadePoints& points, size_t first, size_
   constexpr float kMost = std::numeric_limits<float>::infinity();
   struct Sum {
     Rgb specular{}, grazing{};
-    float low = kMost, high = 0.0f, view = 1.0f;
+    float low = kMost, high = 0.0f, ior_low = kMost, ior_high = 0.0f, view = 1.0f;
   } sums[kLobeCount];
   Aabb box, normals, mirrors;
   Rgb kd{};
-  float least_falloff = kMost;
+  float least_falloff = kMost, rise = 0.0f, view = 1.0f;
+  bool burley = false;
   const auto at = [](const std::vector<float>(&a)[3], size_t i) { return Vec3f{a[0][i], a[1][i], a[2][i]}; };
   for (size_t i = first; i < first + count; ++i) {
     box.extend(points.position_at(i));
     normals.extend(points.normal_at(i));
     kd = max(kd, at(points.diffuse, i));
     least_falloff = std::min(least_falloff, points.falloff[i]);
+    if (points.retro[i] > 0.0f || points.dim[i] > 0.0f) {
+      burley = true, rise = std::max(rise, points.retro[i] - points.dim[i]);
+      view = std::min(view, dot(points.normal_at(i), at(points.mirror, i)));
+    }
     const Rgb specular = at(points.specular, i), grazing = at(points.grazing, i);
     if (!(max_component(specular) > 0.0f || max_component(grazing) > 0.0f)) continue;
     const Vec3f m = at(points.mirror, i);
@@ -181,11 +192,12 @@ void PointNodes::set(size_t lane, const ShadePoints& points, size_t first, size_
     Sum& s = sums[points.lobe[i]];
     s.specular = max(s.specular, specular), s.grazing = max(s.grazing, grazing);
     s.low = std::min(s.low, points.shape[i]), s.high = std::max(s.high, points.shape[i]);
+    s.ior_low = std::min(s.ior_low, points.ior[i]), s.ior_high = std::max(s.ior_high, points.ior[i]);
     s.view = std::min(s.view, dot(points.normal_at(i), m));
     has_lobe |= 1u << points.lobe[i];
   }
   if (has_lobe != 0) lobes = std::max(lobes, has_lobe == 1u << kCosineLobe ? Lobes::cosine : Lobes::all);
-  if (least_falloff > 0.0f) lobes = Lobes::all;
+  if (least_falloff > 0.0f || burley) lobes = Lobes::all;
   used |= 1u << lane;
   const auto put = [lane](float(&to)[3][kLanes], const Vec3f& v) {
     for (int k = 0; k < 3; ++k) to[k][lane] = v[k];
@@ -200,12 +212,14 @@ void PointNodes::set(size_t lane, const ShadePoints& points, size_t first, size_
   normal_cos[lane] = facing.cos_half, normal_sin[lane] = facing.sin_half();
   mirror_cos[lane] = shine.cos_half, mirror_sin[lane] = shine.sin_half();
   put(diffuse, kd);
-  falloff[lane] = least_falloff;
+  falloff[lane] = least_falloff, burley_rise[lane] = rise, view_cosine[lane] = view;
   for (uint32_t k = 0; k < kLobeCount; ++k) {
     const bool some = sums[k].low < kMost;
     put(of_lobe[k].specular, sums[k].specular), put(of_lobe[k].grazing, sums[k].grazing);
-    // Any finite shape where no point has the lobe: its colours are 0.
+    // Any finite numbers where no point has the lobe: its colours are 0.
     of_lobe[k].shape_low[lane] = some ? sums[k].low : 1.0f, of_lobe[k].shape_high[lane] = some ? sums[k].high : 1.0f;
+    of_lobe[k].ior_low[lane] = some ? sums[k].ior_low : 1.5f,
+    of_lobe[k].ior_high[lane] = some ? sums[k].ior_high : 1.5f;
     of_lobe[k].view_cosine[lane] = sums[k].view;
   }
 }
@@ -215,10 +229,11 @@ void PointNodes::pad(size_t lane) {
   const auto copy3 = [&copy](float(&a)[3][kLanes]) { copy(a[0]), copy(a[1]), copy(a[2]); };
   for (auto* a : {&center, &half, &normal, &tangent, &bitangent, &mirror, &mirror_tangent, &mirror_bitangent, &diffuse})
     copy3(*a);
-  for (auto* a : {&normal_cos, &normal_sin, &mirror_cos, &mirror_sin, &radius2, &falloff}) copy(*a);
+  for (auto* a : {&normal_cos, &normal_sin, &mirror_cos, &mirror_sin, &radius2, &falloff, &burley_rise, &view_cosine})
+    copy(*a);
   for (OfLobe& own : of_lobe) {
     copy3(own.specular), copy3(own.grazing);
-    copy(own.shape_low), copy(own.shape_high), copy(own.view_cosine);
+    copy(own.shape_low), copy(own.shape_high), copy(own.ior_low), copy(own.ior_high), copy(own.view_cosine);
   }
 }
 

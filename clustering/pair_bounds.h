@@ -16,12 +16,15 @@ struct alignas(64) PointNodes {
       mirror_sin[kLanes];
   float diffuse[3][kLanes];  // largest of the points, channel by channel
   float falloff[kLanes];     // least of the points
-  float radius2[kLanes];     // squared half diagonal of the box
+  // Largest k of bsdf/burley.h, at least 0, and least cosine to the viewer of the points that are Burley's.
+  float burley_rise[kLanes], view_cosine[kLanes];
+  float radius2[kLanes];  // squared half diagonal of the box
   // What bounds read of the points that have one of the lobes of bsdf/lobes.h.
   struct OfLobe {
     float specular[3][kLanes], grazing[3][kLanes];  // largest, channel by channel
     float shape_low[kLanes], shape_high[kLanes];    // least and largest
-    float view_cosine[kLanes];                      // least cosine of the normal to the viewer
+    float ior_low[kLanes], ior_high[kLanes];
+    float view_cosine[kLanes];  // least cosine of the normal to the viewer
   } of_lobe[kLobeCount];
   uint32_t has_lobe = 0;      // bits of the lobes that some point has
   uint32_t used = 0;          // bits of the lanes that hold points; the others hold copies

@@ -74,15 +74,16 @@ constexpr float kTurn[2][6][2] = {{{0.96592583f, 0.25881905f},
                                    {0.25881905f, -0.96592583f},
                                    {0.96592583f, -0.25881905f}}};
 
-// Mean over the cone of cosθx·cosθl·(1 − falloff·(1 − cosθx)⁴), where `facing` is the light's normal turned around. The
+// Mean over the cone of cosθx·cosθl and the diffuse part's factor, where `facing` is the light's normal turned around. The
 // rings integrate squares of directions exactly: they and the closed form go over into each other.
-template <bool kFalloff, bool kCosine>
-HWY_INLINE V MeanOfCosines(D d, const SphereCone& c, const V3& normal, const V3& facing, V falloff) {
+template <bool kShaped, bool kCosine>
+HWY_INLINE V MeanOfCosines(D d, const SphereCone& c, const V3& normal, const V3& facing, const V3& mirror,
+                           const DiffuseShape& shape) {
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f);
   const V na = Dot(normal, c.axis), la = kCosine ? Dot(facing, c.axis) : one;
   auto above = LiesAbove(d, c, na);
   if constexpr (kCosine) above = hn::And(above, LiesAbove(d, c, la));
-  if constexpr (kFalloff) above = hn::And(above, hn::Eq(falloff, zero));
+  if constexpr (kShaped) above = hn::And(above, hn::Eq(hn::Add(shape.falloff, hn::Add(shape.retro, shape.dim)), zero));
   if (hn::AllTrue(d, above)) {
     // Means of cos and cos² to the axis.
     const V first = hn::NegMulAdd(half, c.versine, one);
@@ -104,6 +105,9 @@ HWY_INLINE V MeanOfCosines(D d, const SphereCone& c, const V3& normal, const V3&
        hn::IfThenElse(upright, hn::Neg(hn::Mul(sign, c.axis.x)), hn::Mul(t.z, inverse))};
   const V3 b = Cross(c.axis, t);
   const V nt = Dot(normal, t), nb = Dot(normal, b), lt = Dot(facing, t), lb = Dot(facing, b);
+  V nm = zero, ma = zero, mt = zero, mb = zero;
+  if constexpr (kShaped)
+    if (shape.burley) nm = Dot(normal, mirror), ma = Dot(mirror, c.axis), mt = Dot(mirror, t), mb = Dot(mirror, b);
   V sum = zero;
   for (size_t ring = 0; ring < 3; ++ring) {
     const V versine = hn::Mul(c.versine, hn::Set(d, kRing[ring])), cosine = hn::Sub(one, versine);
@@ -115,7 +119,11 @@ HWY_INLINE V MeanOfCosines(D d, const SphereCone& c, const V3& normal, const V3&
       V both = cx;
       if constexpr (kCosine)
         both = hn::Mul(cx, hn::Max(zero, hn::MulAdd(cosine, la, hn::MulAdd(x, lt, hn::Mul(y, lb)))));
-      if constexpr (kFalloff) both = hn::Mul(both, DiffuseFalloff(d, falloff, cx));
+      if constexpr (kShaped) {
+        V beta = zero;
+        if (shape.burley) beta = hn::MulAdd(cosine, ma, hn::MulAdd(x, mt, hn::Mul(y, mb)));
+        both = hn::Mul(both, DiffuseFactor(d, shape, nm, cx, beta));
+      }
       of_ring = hn::Add(of_ring, both);
     }
     sum = hn::MulAdd(of_ring, hn::Set(d, kRingWeight[ring] / 6.0f), sum);
@@ -254,20 +262,19 @@ HWY_INLINE LobeSums SphereLobes(D d, const Vpl& light, const Points& points, siz
   auto lit = RisesAbove(d, cone, na);
   if constexpr (kCosine) lit = hn::And(lit, RisesAbove(d, cone, Dot(facing, axis)));
   if (hn::AllFalse(d, lit)) return parts;
-  V falloff = zero;
-  if constexpr (kLobes == Lobes::all) falloff = Load1(d, points.falloff, p);
-  const V even = MeanOfCosines<kLobes == Lobes::all, kCosine>(d, cone, normal, facing, falloff);
+  V3 mirror{zero, zero, zero};
+  if constexpr (kLobes != Lobes::none) mirror = Load3(d, points.mirror, p);
+  const LobeShape shape = LoadShape<kLobes>(d, points, p);
+  const V even = MeanOfCosines<kLobes == Lobes::all, kCosine>(d, cone, normal, facing, mirror, shape.diffuse);
   parts.diffuse = hn::IfThenElseZero(lit, hn::Mul(cone.geometry, even));
   if constexpr (kLobes != Lobes::none) {
-    const V3 mirror = Load3(d, points.mirror, p);
-    const LobeShape shape = LoadShape<kLobes>(d, points, p);
     if (kLobes == Lobes::cosine && hn::AllFalse(d, hn::And(lit, RisesAbove(d, cone, Dot(mirror, axis))))) return parts;
     V specular, grazing;
     MeanOfLobe<kLobes, kCosine>(d, cone, normal, facing, mirror, shape, specular, grazing);
     // Where the cone is narrower than rounding resolves, the lobe is that of its axis.
     const auto narrow = hn::Lt(cone.sine2, hn::Set(d, 1e-8f));
     if (!hn::AllFalse(d, narrow)) {
-      const LobeSums at = LobesTowards<kLobes>(d, points, p, normal, mirror, shape, axis);
+      const LobeSums at = LobesTowards<kLobes>(d, normal, mirror, shape, axis);
       V both = hn::Max(zero, na);
       if constexpr (kCosine) both = hn::Mul(both, hn::Max(zero, Dot(facing, axis)));
       specular = hn::IfThenElse(narrow, hn::Mul(both, at.specular), specular);

@@ -276,7 +276,17 @@ class SceneReader {
       if (!ggx) fresnel->fail("is of the model \"ggx\" alone");
       m.flags = (m.flags & ~uint32_t{LUMICUT_NO_FRESNEL}) | (fresnel->boolean() ? 0u : uint32_t{LUMICUT_NO_FRESNEL});
     }
-    if (!ggx) m.flags &= ~uint32_t{LUMICUT_NO_FRESNEL};
+    if (auto burley = object.find("burley")) {
+      if (!ggx) burley->fail("is of the model \"ggx\" alone");
+      m.flags = (m.flags & ~uint32_t{LUMICUT_BURLEY}) | (burley->boolean() ? uint32_t{LUMICUT_BURLEY} : 0u);
+      if ((m.flags & LUMICUT_BURLEY) != 0 && (m.flags & LUMICUT_NO_FRESNEL) != 0)
+        burley->fail("must be false where \"fresnel\" is");
+    }
+    if (!ggx) m.flags &= ~uint32_t{LUMICUT_NO_FRESNEL | LUMICUT_BURLEY};
+    if (auto tint = object.find("specular_tint")) {
+      if (!ggx) tint->fail("is of the model \"ggx\" alone");
+      store(m.specular_tint, tint->vector3(1e-6, 1));
+    }
     number("shininess", m.shininess, 0, 1e6, !ggx);
     number("roughness", m.roughness, 0, 1, ggx);
     number("metallic", m.metallic, 0, 1, ggx);
@@ -307,6 +317,7 @@ class SceneReader {
         };
         flag("clamp", LUMICUT_CLAMP);
         flag("nearest", LUMICUT_NEAREST);
+        flag("by_view", LUMICUT_BY_VIEW);
         keys.finish();
         out = textures_.get(resolve(file), use, flags, user);
       } else {

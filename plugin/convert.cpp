@@ -61,11 +61,15 @@ Texture to_texture(const lumicut_texture& in, uint64_t index) {
   c.integer("height", in.height, 1, 65536);
   c.integer("channels", in.channels, 1, 4);
   c.integer("format", in.format, LUMICUT_UINT8, LUMICUT_FLOAT32);
-  c.flags("flags", in.flags, LUMICUT_SRGB | LUMICUT_CLAMP | LUMICUT_NEAREST);
+  c.flags("flags", in.flags, LUMICUT_SRGB | LUMICUT_CLAMP | LUMICUT_NEAREST | LUMICUT_BY_VIEW);
+  const bool by_view = (in.flags & LUMICUT_BY_VIEW) != 0;
+  if (by_view && in.width % 2 != 0)
+    c.fail("width", number_text(uint64_t{in.width}) + " is not even, as LUMICUT_BY_VIEW needs it");
   if (in.pixels == nullptr) c.fail("pixels", "is NULL");
   Texture::Options options;
   options.srgb = (in.flags & LUMICUT_SRGB) != 0;
-  options.clamp = (in.flags & LUMICUT_CLAMP) != 0;
+  options.by_view = by_view;
+  options.clamp = by_view || (in.flags & LUMICUT_CLAMP) != 0;
   options.nearest = (in.flags & LUMICUT_NEAREST) != 0;
   return {in.width,    in.height,
           in.channels, in.format == LUMICUT_UINT8 ? Texture::Format::uint8 : Texture::Format::float32,
@@ -74,13 +78,18 @@ Texture to_texture(const lumicut_texture& in, uint64_t index) {
 
 Material to_material(const lumicut_material& in, uint64_t index) {
   const FieldValidator c("lumicut_material", index);
-  c.flags("flags", in.flags, LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG | LUMICUT_GGX | LUMICUT_NO_FRESNEL);
+  c.flags("flags", in.flags,
+          LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG | LUMICUT_GGX | LUMICUT_NO_FRESNEL | LUMICUT_BURLEY);
   if ((in.flags & LUMICUT_PHONG) != 0 && (in.flags & LUMICUT_GGX) != 0)
     c.fail("flags", "holds both LUMICUT_PHONG and LUMICUT_GGX");
   if ((in.flags & LUMICUT_NO_FRESNEL) != 0) {
     if ((in.flags & LUMICUT_GGX) == 0) c.fail("flags", "holds LUMICUT_NO_FRESNEL without LUMICUT_GGX");
     if (in.metallic > 0.0f) c.fail("metallic", "must be 0 with LUMICUT_NO_FRESNEL");
     if (in.transmission > 0.0f) c.fail("transmission", "must be 0 with LUMICUT_NO_FRESNEL");
+  }
+  if ((in.flags & LUMICUT_BURLEY) != 0) {
+    if ((in.flags & LUMICUT_GGX) == 0) c.fail("flags", "holds LUMICUT_BURLEY without LUMICUT_GGX");
+    if ((in.flags & LUMICUT_NO_FRESNEL) != 0) c.fail("flags", "holds both LUMICUT_BURLEY and LUMICUT_NO_FRESNEL");
   }
   // Of a textured colour the product must be a share, not the factor: Scene::bsdf_parameters sees to that.
   constexpr float kLargestFactor = 1e6f;
@@ -104,6 +113,9 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   if ((in.flags & LUMICUT_PHONG) != 0) m.lobe = LobeModel::phong;
   if ((in.flags & LUMICUT_GGX) != 0) m.lobe = LobeModel::ggx;
   m.fresnel = (in.flags & LUMICUT_NO_FRESNEL) == 0;
+  m.burley = (in.flags & LUMICUT_BURLEY) != 0;
+  c.range("specular_tint", in.specular_tint, 0.0f, 1.0f);
+  if (max_component(vec(in.specular_tint)) > 0.0f) m.specular_tint = vec(in.specular_tint);
   m.roughness = in.roughness, m.metallic = in.metallic, m.transmission = in.transmission;
   m.ior = in.ior == 0.0f ? 1.5f : in.ior;
   m.coat = in.coat, m.coat_roughness = in.coat_roughness;

@@ -20,6 +20,8 @@ struct Material {
   // GGX alone: `diffuse` is the base colour, `specular` multiplies the dielectric's reflectance at normal incidence.
   // Without `fresnel` it is the lobe's own reflectance at every angle, beside Lambert's `diffuse`: no metal, no glass.
   bool fresnel = true;
+  bool burley = false;         // the diffuse part; and the lobes above take nothing from it
+  Rgb specular_tint{1, 1, 1};  // of metal at 82 degrees, and of what glass reflects
   float roughness = 0.5f, metallic = 0.0f, ior = 1.5f, transmission = 0.0f;
   float coat = 0.0f, coat_roughness = 0.0f, coat_ior = 1.5f;  // a clear layer over all of this; `coat`: its share
   float opacity = 1.0f;
@@ -32,10 +34,11 @@ struct Material {
   int32_t roughness_texture = -1, metallic_texture = -1;  // GGX alone; green and blue, as glTF packs them
   int32_t diffuse_texture = -1, specular_texture = -1, opacity_texture = -1, emission_texture = -1;
   int32_t translucency_texture = -1;
-  LUMICUT_FIELDS(Material, diffuse, specular, translucency, shininess, lobe, fresnel, roughness, metallic, ior,
-                 transmission, coat, coat_roughness, coat_ior, opacity, emission, emit_both_sides, normal_strength,
-                 normal_texture, bump_strength, bump_distance, height_texture, roughness_texture, metallic_texture,
-                 diffuse_texture, specular_texture, opacity_texture, emission_texture, translucency_texture)
+  LUMICUT_FIELDS(Material, diffuse, specular, translucency, shininess, lobe, fresnel, burley, specular_tint, roughness,
+                 metallic, ior, transmission, coat, coat_roughness, coat_ior, opacity, emission, emit_both_sides,
+                 normal_strength, normal_texture, bump_strength, bump_distance, height_texture, roughness_texture,
+                 metallic_texture, diffuse_texture, specular_texture, opacity_texture, emission_texture,
+                 translucency_texture)
 
   bool translucent() const { return max_component(translucency) > 0.0f; }
   bool emissive() const { return max_component(emission) > 0.0f; }

@@ -150,26 +150,32 @@ void Scene::set_trace(AccelFactory factory) {
 }
 
 void Scene::check_references() const {
-  const auto check_texture = [&](int32_t index, size_t material, const char* field) {
+  const auto check_texture = [&](int32_t index, size_t material, const char* field, bool by_view = false) {
+    if (index >= 0 && static_cast<size_t>(index) < textures_.size() && textures_[index].is_by_view() && !by_view)
+      fail_argument(at("material", material) + "." + field + " = " + std::to_string(index) +
+                    " is a texture by view, which this field cannot have");
     if (index >= 0 && static_cast<size_t>(index) >= textures_.size())
       fail_argument(at("material", material) + "." + field + " = " + std::to_string(index) +
                     " is out of range: the scene has " + std::to_string(textures_.size()) + " textures");
   };
   for (size_t i = 0; i < materials_.size(); ++i) {
-    check_texture(materials_[i].diffuse_texture, i, "diffuse_texture");
-    check_texture(materials_[i].specular_texture, i, "specular_texture");
+    check_texture(materials_[i].diffuse_texture, i, "diffuse_texture", true);
+    check_texture(materials_[i].specular_texture, i, "specular_texture", true);
     check_texture(materials_[i].opacity_texture, i, "opacity_texture");
     check_texture(materials_[i].emission_texture, i, "emission_texture");
-    check_texture(materials_[i].translucency_texture, i, "translucency_texture");
+    check_texture(materials_[i].translucency_texture, i, "translucency_texture", true);
     check_texture(materials_[i].normal_texture, i, "normal_texture");
     check_texture(materials_[i].height_texture, i, "height_texture");
-    check_texture(materials_[i].roughness_texture, i, "roughness_texture");
-    check_texture(materials_[i].metallic_texture, i, "metallic_texture");
+    check_texture(materials_[i].roughness_texture, i, "roughness_texture", true);
+    check_texture(materials_[i].metallic_texture, i, "metallic_texture", true);
   }
   for (size_t i = 0; i < lights_.size(); ++i)
     if (lights_[i].profile != 0 && profiles_.find(lights_[i].profile) == nullptr)
       fail_argument(at("light", i) + ".profile = " + std::to_string(lights_[i].profile) +
                     " is none of the scene's profiles");
+  if (environment_.texture >= 0 && static_cast<size_t>(environment_.texture) < textures_.size() &&
+      textures_[environment_.texture].is_by_view())
+    fail_argument("environment.texture = " + std::to_string(environment_.texture) + " is a texture by view");
   if (environment_.texture >= 0 && static_cast<size_t>(environment_.texture) >= textures_.size())
     fail_argument("environment.texture = " + std::to_string(environment_.texture) + " is out of range: the scene has " +
                   std::to_string(textures_.size()) + " textures");
@@ -365,18 +371,21 @@ Vec3f Scene::mapped_normal(const Material& material, const SurfaceHit& hit, cons
 }
 
 SurfaceInteraction Scene::interaction(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const {
-  return {hit,
-          emitted(hit, to_viewer),
-          bsdf_parameters(hit.material, hit.uv),
-          {hit.position, hit.geometric_normal, hit.normal, to_viewer, hit.offset, pixel}};
+  const SurfaceView view{hit.position, hit.geometric_normal, hit.normal, to_viewer, hit.offset, pixel};
+  return {hit, emitted(hit, to_viewer), bsdf_parameters(hit.material, hit.uv, view), view};
 }
 
-BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv) const {
+BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv, const SurfaceView& view) const {
   const Material& m = materials_[material];
   const auto share = [](float x) { return std::min(1.0f, std::max(0.0f, x)); };
+  const auto color = [&](int32_t texture) {
+    const Texture& t = textures_[texture];
+    if (!t.is_by_view()) return t.color(uv.x, uv.y);
+    return t.by_view(std::abs(dot(view.normal, view.to_viewer)), dot(view.geometric_normal, view.to_viewer) < 0.0f);
+  };
   const auto texel = [&](const Rgb& factor, int32_t texture) {
     if (texture < 0) return factor;
-    const Rgb c = factor * textures_[texture].color(uv.x, uv.y);
+    const Rgb c = factor * color(texture);
     return Rgb{share(c.x), share(c.y), share(c.z)};
   };
   BsdfParameters p;
@@ -385,12 +394,12 @@ BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv) const {
   p.translucency = texel(m.translucency, m.translucency_texture);
   p.exponent = m.shininess;
   if (m.lobe != LobeModel::ggx) return p;
-  p.fresnel = m.fresnel;
+  p.fresnel = m.fresnel, p.additive = m.burley, p.specular_tint = m.specular_tint;
   float roughness = m.roughness;
-  if (m.roughness_texture >= 0) roughness *= share(textures_[m.roughness_texture].color(uv.x, uv.y).y);
+  if (m.roughness_texture >= 0) roughness *= share(color(m.roughness_texture).y);
   p.alpha = roughness * roughness;
   p.metallic = m.metallic;
-  if (m.metallic_texture >= 0) p.metallic = share(p.metallic * textures_[m.metallic_texture].color(uv.x, uv.y).z);
+  if (m.metallic_texture >= 0) p.metallic = share(p.metallic * color(m.metallic_texture).z);
   p.ior = m.ior, p.transmission = m.transmission;
   p.coat = m.coat, p.coat_alpha = m.coat_alpha(), p.coat_ior = m.coat_ior;
   p.glass = glass_[material].get();

@@ -128,10 +128,10 @@ class Scene final : private HitFilter {
   SurfaceInteraction interaction(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel = 0) const;
   // How a place scatters light: of a host's own point too. `material` must be in range (checked by the caller).
   Bsdf bsdf(const SurfaceView& view, uint32_t material, Vec2f uv) const {
-    return {bsdf_parameters(material, uv), view};
+    return {bsdf_parameters(material, uv, view), view};
   }
   // The material's description there, its textures looked up.
-  BsdfParameters bsdf_parameters(uint32_t material, Vec2f uv) const;
+  BsdfParameters bsdf_parameters(uint32_t material, Vec2f uv, const SurfaceView& view = {}) const;
   // Whether any material has a rough clear coat: points may have two layers.
   size_t most_layers() const { return most_layers_; }
   // Whether any material may have a specular lobe.

@@ -80,6 +80,12 @@ Rgb Texture::color(float u, float v) const {
   return filter(u, v, [&](uint32_t x, uint32_t y) { return texel(x, y); });
 }
 
+Rgb Texture::by_view(float cosine, bool behind) const {
+  const auto half = static_cast<float>(width_ / 2);
+  const float step = std::min(1.0f, std::max(0.0f, cosine)) * (half - 1.0f);
+  return color((behind ? half - 0.5f - step : half + 0.5f + step) / static_cast<float>(width_), 0.5f);
+}
+
 float Texture::mask(float u, float v) const {
   return filter(u, v, [&](uint32_t x, uint32_t y) {
     if (channels_ == 1) return value(x, y, 0);

@@ -16,7 +16,9 @@ class Texture {
     bool srgb = false;     // decode colour channels (never alpha) from sRGB
     bool clamp = false;    // else repeat
     bool nearest = false;  // else bilinear
-    LUMICUT_FIELDS(Options, srgb, clamp, nearest)
+    // Looked up by the view instead of by uv: see by_view(). An even width.
+    bool by_view = false;
+    LUMICUT_FIELDS(Options, srgb, clamp, nearest, by_view)
   };
 
   // `pixels`: height rows of width texels of `channels` (1..4) values, packed, row 0 on top (v = 1). Copied.
@@ -25,6 +27,11 @@ class Texture {
 
   // Linear colour at (u, v), v upwards; one channel is grey, two are grey and alpha. Never NaN.
   Rgb color(float u, float v) const;
+  // Where the texture of a surface is looked up that is seen at `cosine` to its normal. Its right half is for the front,
+  // from edge-on to straight on between the centres of its first and last texels; its left half likewise, mirrored, for
+  // the back.
+  bool is_by_view() const { return options_.by_view; }
+  Rgb by_view(float cosine, bool behind) const;
   // The opacity mask's value: the only channel, the alpha of two or four, the mean of three.
   float mask(float u, float v) const;
 

@@ -402,10 +402,11 @@ class Examiner {
     double reflected = 0, total = 0;
     for (size_t m = 0; m < area.size(); ++m) {
       const auto& v = scene_.materials[m].values;
-      const Point albedo = textured(v.diffuse, v.diffuse_texture) + textured(v.specular, v.specular_texture);
+      const Point albedo = textured(v.diffuse, v.diffuse_texture) + textured(v.specular, v.specular_texture) +
+                           textured(v.translucency, v.translucency_texture);
       if (area[m] > 0 && largest(albedo) > 1.0 + 1e-4)
         say("albedo_above_one",
-            fmt::format("material \"{}\": diffuse and specular together reflect {:.3g} of the light",
+            fmt::format("material \"{}\": diffuse, specular and translucency together give back {:.3g} of the light",
                         scene_.materials[m].name, largest(albedo)));
       reflected += area[m] * std::min(1.0, luminance(albedo)), total += area[m];
     }

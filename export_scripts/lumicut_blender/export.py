@@ -155,7 +155,7 @@ class Writer:
 
     def texture(self, number, use):
         name, flags = self.image(number, use), self.data.images[number - 1].flags
-        options = {key: True for key, bit in (("clamp", library.CLAMP), ("nearest", library.NEAREST)) if flags & bit}
+        options = {key: True for key, bit in (("clamp", library.CLAMP), ("nearest", library.NEAREST), ("by_view", library.BY_VIEW)) if flags & bit}
         return {"file": name, **options} if options else name
 
     def material(self, name, m):
@@ -164,6 +164,10 @@ class Writer:
             out["model"] = "ggx"
             if m.flags & library.NO_FRESNEL:
                 out["fresnel"] = False
+            if m.flags & library.BURLEY:
+                out["burley"] = True
+            if any(m.specular_tint):
+                out["specular_tint"] = numbers(m.specular_tint)
             for key in ("roughness", "metallic", "ior", "transmission"):
                 out[key] = numbers([getattr(m, key)])[0]
             if m.coat > 0:

@@ -43,6 +43,17 @@ class Picture:
         """Whether it does not repeat."""
         return bool(self.flags & library.CLAMP)
 
+    def is_by_view(self):
+        return bool(self.flags & library.BY_VIEW)
+
+    def mean(self):
+        """Over the texels; by view over even directions in front."""
+        if not self.is_by_view():
+            return self.linear().mean((0, 1))
+        half = self.linear().shape[1] // 2
+        weights = np.arange(half, dtype=np.float32)
+        return (self.linear()[0, half:] * weights[:, None]).sum(0) / weights.sum()
+
     def moved(self, mapping, key):
         return Picture(self.name, key, mapping, self.flags, self._stored, self._linear)
 

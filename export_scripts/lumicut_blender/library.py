@@ -21,8 +21,8 @@ IDLE, RUNNING, DONE, STOPPED, FAILED = range(5)
 FLOAT, INT, BOOL, CHOICE = range(4)
 UINT8, FLOAT32 = 0, 1
 ROBUST, FAST = 1, 2  # of SceneDesc.robust
-SRGB, CLAMP, NEAREST = 1, 2, 4
-EMIT_BOTH_SIDES, PHONG, GGX, NO_FRESNEL = 1, 2, 4, 8
+SRGB, CLAMP, NEAREST, BY_VIEW = 1, 2, 4, 8
+EMIT_BOTH_SIDES, PHONG, GGX, NO_FRESNEL, BURLEY = 1, 2, 4, 8, 16
 POINT, SPOT, RECTANGLE, DISK, SUN = range(5)
 RADIOMETRIC, WATT = 0, 1
 HIDDEN = 1  # of Environment.flags
@@ -141,7 +141,7 @@ class Material(Descriptor):
                 ("height_texture", c_int32), ("bump_distance", c_float), ("bump_strength", c_float),
                 ("roughness_texture", c_int32), ("metallic_texture", c_int32), ("coat", c_float),
                 ("coat_roughness", c_float), ("coat_ior", c_float), ("translucency", c_float * 3),
-                ("translucency_texture", c_int32)]
+                ("translucency_texture", c_int32), ("specular_tint", c_float * 3)]
 
 
 class Mesh(Descriptor):
@@ -206,7 +206,7 @@ class ChannelInfo(Descriptor):
 
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
 SIZES = {Ray: 48, Hit: 32, Rayhit: 80, Vpl: 64, Point: 64, DeviceDesc: 32, Status: 64, AccelDesc: 80, AccelInfo: 80,
-         AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 32, Material: 140, Mesh: 88, Light: 116, Profile: 40,
+         AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 32, Material: 152, Mesh: 88, Light: 116, Profile: 40,
          Environment: 64, Camera: 92, IntegratorInfo: 88, ParamInfo: 72, RenderDesc: 72, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32

@@ -35,14 +35,6 @@ def ior_of(reflectance):
     return (1 + root) / (1 - root)
 
 
-def dimming(f0, alpha, f90=None):
-    """Mean share of light that the library's lobe leaves to what is beneath: counterpart of lobe_transmittance in bsdf/lobe_transmittance.h."""
-    a2 = alpha * alpha
-    left = 1 - f0 * (1 - 1.643 * a2 / (1 + 2.248 * a2))
-    fade = min(1, ((min(1, 50 * f0) if f90 is None else f90) / (1 + 8 * alpha + 5 * a2) + 0.4 * f0 * a2) / left)
-    return left * (1 - fade / 15)
-
-
 # Mean share of even light that single reflection at GGX facets loses, by α: twin of mean_facet_loss in
 # bsdf/facet_albedo.h; and about what balls of metal lose in Cycles 3.4, which masks view and light each by itself.
 ALPHAS = (0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1)
@@ -50,14 +42,17 @@ LOSSES = (0, 0.006, 0.0318, 0.0842, 0.1532, 0.2269, 0.3, 0.3697, 0.4341, 0.4925,
 LOSSES_APART = (0, 0.006, 0.032, 0.087, 0.157, 0.233, 0.309, 0.385, 0.456, 0.524, 0.584, 0.638)
 
 
+MEAN_SHARE = 0.054  # of the way from F0 to 1, over even light: kMeanShare in bsdf/ggx_material.h
+
+
 def single_scattering(colour, alpha):
     """Colour of a metal that with the library's multiple scattering reflects, of even light, what `colour` reflects
-    without: with F the mean of Schlick's Fresnel, F (1 − L)/(1 − F L) instead of F (1 − L)."""
+    without: with F the mean of Fresnel's curve, F (1 − L)/(1 − F L) instead of F (1 − L)."""
     lost = np.interp(alpha, ALPHAS, LOSSES)
     wanted = np.interp(alpha, ALPHAS, LOSSES_APART if bpy.app.version < (4, 0, 0) else LOSSES)
-    left = (np.asarray(colour) * (20 / 21) + 1 / 21) * (1 - wanted)
+    left = (np.asarray(colour) * (1 - MEAN_SHARE) + MEAN_SHARE) * (1 - wanted)
     mean = left / (1 - lost + left * lost)
-    return np.maximum(0, (mean - 1 / 21) * (21 / 20))
+    return np.maximum(0, (mean - MEAN_SHARE) / (1 - MEAN_SHARE))
 
 
 # Share of light that single scattering leaves of what passes a glass ball of index 1.5, by roughness in steps of 0.1:
@@ -76,10 +71,6 @@ class ClearCoat:
     share: float
     roughness: float
     ior: float
-
-    def leaves(self):
-        f0 = normal_reflectance(self.ior)
-        return dimming(self.share * f0, self.roughness ** 2, self.share * min(1, 50 * f0))
 
 
 @dataclasses.dataclass
@@ -106,6 +97,8 @@ class Surface:
     rough_picture: Value = None  # `roughness` is its mean then
     by_place: ByPlace = None
     clearcoat: ClearCoat = None
+    burley: bool = False  # the diffuse part, of which coats take nothing
+    tint: tuple = None    # of metal's edge, of what glass reflects
 
 
 def cut_of(factor, picture):
@@ -163,6 +156,12 @@ class SurfaceReader(Evaluator):
                 by_place = of.by_place
             else:
                 self.note("metallic", "Textures taken as their mean")
+        da, db = f.scalar() * luminance(a.diffuse), g.scalar() * luminance(b.diffuse)
+        if da > 0 and db > 0 and a.burley != b.burley:
+            self.note("", "Diffuse parts of two models in one material, taken as the stronger one's")
+        if wa + wb <= 0:
+            roughness = a.roughness if da >= db else b.roughness
+            picture = a.rough_picture if da >= db else b.rough_picture
         coats = [(h.scalar(), s.clearcoat) for h, s in ((f, a), (g, b)) if s.clearcoat and h.scalar() > 0]
         clearcoat = None
         if coats:
@@ -172,7 +171,8 @@ class SurfaceReader(Evaluator):
         summed = {slot: self.add(self.multiply(f, getattr(a, slot)), self.multiply(g, getattr(b, slot)))
                   for slot in ("diffuse", "metal", "glass", "coat", "gloss", "translucency", "emission", "opacity")}
         return Surface(roughness=roughness, ior=a.ior if luminance(a.glass) > luminance(b.glass) else b.ior,
-                       rough_picture=picture, by_place=by_place, clearcoat=clearcoat, **summed)
+                       rough_picture=picture, by_place=by_place, clearcoat=clearcoat, burley=a.burley if da >= db else b.burley,
+                       tint=a.tint if wa >= wb else b.tint, **summed)
 
     def closure_mix_shader(self, node, stack):
         f = self.value(node.inputs[0], stack)
@@ -211,7 +211,7 @@ class SurfaceReader(Evaluator):
             if not socket.is_linked:
                 return
             height = self.grey(self.value(socket, stack))
-            if height.picture is not None:
+            if height.picture is not None and not height.picture.is_by_view():
                 distance = self.number(source.inputs["Distance"], stack, "bump distance") * float(height.factor[0])
                 strength = self.number(source.inputs["Strength"], stack, "bump strength")
                 if distance == 0 or strength <= 0:
@@ -225,7 +225,7 @@ class SurfaceReader(Evaluator):
         if source.type == "NORMAL_MAP" and source.space == "TANGENT":
             colour = self.value(source.inputs["Color"], stack)
             strength = self.number(source.inputs["Strength"], stack, "normal strength")
-            if colour.picture is not None and (colour.factor == 1).all():
+            if colour.picture is not None and not colour.picture.is_by_view() and (colour.factor == 1).all():
                 if strength > 0 and self.normals is None:
                     self.normals = colour.picture, min(10.0, strength)
                 elif strength > 0 and self.normals[0].key != colour.picture.key:
@@ -272,7 +272,9 @@ class SurfaceReader(Evaluator):
         self.bumps(node, stack)
         self.note("Metallic BSDF", "Shaders taken as metal of their base colour")
         gloss = self.rough(node, stack)
-        return Surface(metal=self.metal(node, self.value(input_of(node, "Base Color", "Color"), stack), gloss), **gloss)
+        edge = node.inputs.get("Edge Tint")
+        tint = None if edge is None else tuple(self.value(edge, stack).mean())
+        return Surface(metal=self.metal(node, self.value(input_of(node, "Base Color", "Color"), stack), gloss), tint=tint, **gloss)
 
     def closure_emission(self, node, stack):
         colour, strength = self.value(node.inputs["Color"], stack), self.value(node.inputs["Strength"], stack)
@@ -304,10 +306,8 @@ class SurfaceReader(Evaluator):
         self.note_glass(node)
         colour = self.value(node.inputs["Color"], stack)
         ior, gloss = self.number(node.inputs["IOR"], stack, "IOR"), self.gloss(node, stack)
-        if (colour.mean() < 0.99).any():
-            self.note(node.bl_label, "Coloured glass: what it reflects keeps its colour here")
         through = self.multiply(self.multiply(colour, colour), self.loss(node, gloss, ior))
-        return Surface(glass=through, ior=ior, **gloss)
+        return Surface(glass=through, ior=ior, tint=tuple(colour.mean()), **gloss)
 
     def closure_bsdf_refraction(self, node, stack):
         self.note(node.bl_label, "Shaders taken as glass, which reflects too")
@@ -345,7 +345,7 @@ class SurfaceReader(Evaluator):
             # have it at α². It takes nothing from what is beneath.
             coat = ClearCoat(0.25 * share, math.sqrt(rough), 1.5)
             self.note("clearcoat", "Clearcoats (GTR1) as GGX of the same median width")
-            return coat, Value(1 / coat.leaves())
+            return coat, ONE
         coat = ClearCoat(share, rough, min(10.0, max(1.0, self.number(node.inputs["Coat IOR"], stack, "coat IOR"))))
         tint = np.clip(self.value(node.inputs.get("Coat Tint"), stack).mean(), 0, 1)
         if (tint == 1).all():
@@ -362,14 +362,11 @@ class SurfaceReader(Evaluator):
             socket = input_of(node, *names)
             return self.value(socket, stack) if socket is not None else ZERO
 
-        for names, text in ((("Sheen", "Sheen Weight"), "sheen"), (("Anisotropic",), "anisotropy"), (("Specular Tint",), "specular tint"),
-                            (("Thin Film Thickness",), "thin film")):
+        for names, text in ((("Sheen", "Sheen Weight"), "sheen"), (("Anisotropic",), "anisotropy"), (("Thin Film Thickness",), "thin film")):
             socket = input_of(node, *names)
             if socket is None:
                 continue
-            v = self.value(socket, stack)
-            white = text == "specular tint" and socket.type == "RGBA"  # 4.x: a colour, white for none
-            if (v.mean() != 1).any() if white else not v.is_zero():
+            if not self.value(socket, stack).is_zero():
                 self.note(text, "Principled features left out")
         base = value("Base Color")
         scattered = value("Subsurface", "Subsurface Weight")
@@ -386,20 +383,20 @@ class SurfaceReader(Evaluator):
             f0 = self.multiply(value("Specular IOR Level"), Value(2 * normal_reflectance(ior)))
         else:
             f0 = self.multiply(value("Specular"), Value(0.08))
+        tint = node.inputs.get("Specular Tint")
+        if tint is not None and tint.type == "RGBA":  # 4.x: of the dielectric straight on, of metal at its edge
+            tint = self.value(tint, stack)
+            f0, tint = self.multiply(f0, tint), tuple(tint.mean())
+        elif tint is not None:  # towards the base colour's hue
+            share = np.clip(self.number(tint, stack, "specular tint"), 0, 1)
+            if share > 0 and not base.is_zero():
+                f0 = self.multiply(f0, Value(1 + share * (base.mean() / max(luminance(base), 1e-6) - 1)))
+            tint = None
         dielectric = self.complement(metallic)
         opaque = self.multiply(dielectric, self.complement(transmission))
         gloss = self.rough(node, stack)
-        rough = gloss["roughness"]
         clearcoat, beneath = self.clear_coat(node, stack)
         base, f0 = self.multiply(beneath, base), self.multiply(beneath, f0)
-        if bpy.app.version < (4, 0, 0) and not base.is_zero() and not dielectric.is_zero():
-            # Burley's diffuse, which Blender gave up with 4.0: 0.5 to 1.1 times Lambert by direction. Its albedo under
-            # even light from all sides, integrated numerically, is linear in the roughness to 0.001.
-            self.note("", "Principled's diffuse part (Burley) as Lambert of the same mean albedo")
-            # The coat took nothing from it either.
-            lambert = self.multiply(base, Value((0.953 + 0.1123 * rough) / dimming(f0.mean().max(), rough * rough)))
-        else:
-            lambert = base
         # Before 4.0 each border coloured by the base, since then by its root. A diffuse share needs the base itself.
         pure = transmission.picture is None and (transmission.factor >= 0.99).all()
         through = self.multiply(base, base) if pure and bpy.app.version < (4, 0, 0) else base
@@ -416,10 +413,10 @@ class SurfaceReader(Evaluator):
         opacity = value("Alpha")
         by_place = None
         if metallic.picture is not None:
-            by_place = ByPlace(metallic, base if lambert is metal else self.mix(metallic, lambert, metal), f0)
-        return Surface(diffuse=self.multiply(lambert, opaque), metal=self.multiply(metal, metallic), glass=glass,
+            by_place = ByPlace(metallic, base if metal is base else self.mix(metallic, base, metal), f0)
+        return Surface(diffuse=self.multiply(base, opaque), metal=self.multiply(metal, metallic), glass=glass,
                        coat=self.multiply(f0, opaque), ior=ior, emission=emission, opacity=opacity, by_place=by_place,
-                       clearcoat=clearcoat, **gloss)
+                       clearcoat=clearcoat, burley=bpy.app.version < (4, 0, 0), tint=tint, **gloss)
 
 
 @dataclasses.dataclass
@@ -484,11 +481,15 @@ class Materials:
             value = values.get(slot) or getattr(surface, slot)
             if value.picture is not None and value.is_zero():
                 value = ZERO
+            if value.picture is not None and value.picture.is_by_view() and slot in ("emission", "opacity"):
+                if not np.ptp(value.picture.linear()) < 1e-6:
+                    self.report.note(f"{name} ({slot})", "Emission and holes that depend on the view, taken as their mean")
+                value = Value(np.round(value.mean(), 6))
             factors[slot] = np.maximum(np.nan_to_num(value.factor), 0)
             if value.picture is not None:
                 pictures[slot] = value.picture
         for slot in ("diffuse", "specular", "translucency"):
-            if cut_of(factors[slot], pictures.get(slot)) > 0.07:  # white by Burley's albedo goes without saying
+            if cut_of(factors[slot], pictures.get(slot)) > 0.01:
                 self.report.note(name, "Colours above 1 cut to 1")
             # With a picture the library cuts the product.
             getattr(m, slot)[:] = np.minimum(factors[slot], 1 if slot not in pictures else LARGEST_FACTOR).tolist()
@@ -501,12 +502,13 @@ class Materials:
             pictures["normal"], m.normal_strength = normals
         if heights is not None:
             pictures["height"], m.bump_distance, m.bump_strength = heights
-        every = [slot for slot in (*SLOTS, "roughness", "metallic", "normal", "height") if slot in pictures]
+        every = [slot for slot in (*SLOTS, "roughness", "metallic", "normal", "height")
+                 if slot in pictures and not pictures[slot].is_by_view()]
         together = aligned([pictures[slot] for slot in every], lambda p: self.report.note(f"{name} ({p})", COARSE))
         if together is None:
             self.report.note(name, "Textures of one material on several coordinates, all laid on the first's")
         else:
-            pictures = dict(zip(every, together))
+            pictures.update(zip(every, together))
         mapping = pictures[every[0]].mapping if every else Mapping()
         for slot, picture in pictures.items():
             if slot == "opacity":
@@ -525,9 +527,14 @@ class Materials:
             surface = dataclasses.replace(surface, metal=add(surface.metal, surface.gloss), gloss=ZERO)
         d, metal, glass = luminance(surface.diffuse), luminance(surface.metal), luminance(surface.glass)
         coat, diffuse = surface.coat, surface.diffuse
-        if metal + glass + luminance(coat) + luminance(surface.gloss) <= 0 and surface.clearcoat is None:
+        matt = metal + glass + luminance(coat) + luminance(surface.gloss) <= 0 and surface.clearcoat is None
+        if matt and not (surface.burley and d > 0):
             return {"diffuse": diffuse, "specular": ZERO}
         m.flags |= library.GGX
+        if surface.burley and luminance(surface.gloss) <= 0:
+            m.flags |= library.BURLEY
+        if surface.tint is not None:
+            m.specular_tint[:] = np.clip(surface.tint, 1e-3, 1).tolist()
         if surface.clearcoat is not None:
             c = surface.clearcoat
             m.coat, m.coat_roughness, m.coat_ior = c.share, self._raised(c.roughness, name), c.ior
@@ -540,7 +547,7 @@ class Materials:
                 self._raised(MIRROR, name)
                 value = evaluator.apply("gloss limit", lambda r: np.where((MIRROR <= r) & (r < least), least, r), value)
             pictured["roughness"] = value
-        m.roughness, m.ior = self._raised(surface.roughness, name), min(10.0, max(0.1, surface.ior))
+        m.roughness, m.ior = surface.roughness if matt else self._raised(surface.roughness, name), min(10.0, max(0.1, surface.ior))
         if luminance(surface.gloss) > 0:
             m.flags |= library.NO_FRESNEL
             return {**pictured, "diffuse": diffuse, "specular": surface.gloss}

@@ -24,7 +24,7 @@ class Value:
     def mean(self):
         if self.picture is None:
             return self.factor
-        return self.factor * self.picture.linear().mean((0, 1))
+        return self.factor * self.picture.mean()
 
     def scalar(self):
         return float(self.mean() @ LUMINANCE)
@@ -37,6 +37,18 @@ class Value:
 
 
 ZERO, ONE = Value(0), Value(1)
+
+
+VIEW_TEXELS = 128  # of a picture by view: half of them for each side
+
+
+def fresnel(cosine, ior):
+    """Reflectance of a dielectric's border."""
+    g2 = ior * ior - 1 + cosine * cosine
+    g = np.sqrt(np.maximum(g2, 0))
+    a = (g - cosine) / np.maximum(g + cosine, 1e-12)
+    b = (cosine * (g + cosine) - 1) / (cosine * (g - cosine) + 1)
+    return np.where(g2 > 0, 0.5 * a * a * (1 + b * b), 1.0)
 
 
 def input_of(node, *names):
@@ -289,14 +301,31 @@ class Evaluator:
     def _blackbody(self, node, output, stack):
         return Value(blackbody(self.number(node.inputs[0], stack, "Blackbody temperature")))
 
+    def by_view(self, key, fn):
+        """A picture of fn(cosine to the viewer, whether seen from behind), of arrays."""
+        half = VIEW_TEXELS // 2
+        cosine = np.arange(half, dtype=np.float64) / (half - 1)
+        grey = np.concatenate([fn(cosine, True)[::-1], fn(cosine, False)]).astype(np.float32)
+        linear = np.repeat(grey[None, :, None], 3, 2)
+        return Value(1, Picture(key[0], ("view", *key), Mapping("VIEW"), library.CLAMP | library.BY_VIEW, linear=linear))
+
     def _fresnel(self, node, output, stack):
-        ior = max(1e-3, self.number(input_of(node, "IOR"), stack, "Fresnel"))
-        self.note("Fresnel", "Nodes that depend on the view, taken as seen from the front")
-        return Value(((ior - 1) / (ior + 1)) ** 2)
+        ior = max(1e-5, self.number(input_of(node, "IOR"), stack, "Fresnel"))
+        return self.by_view(("Fresnel", ior), lambda c, behind: fresnel(c, 1 / ior if behind else ior))
 
     def _layer_weight(self, node, output, stack):
-        self.note("Layer Weight", "Nodes that depend on the view, taken as seen from the front")
-        return Value(0.04 if output.name == "Fresnel" else 0.0)
+        blend = self.number(node.inputs["Blend"], stack, "Layer Weight")
+        if output.name == "Fresnel":
+            ior = 1 / max(1 - blend, 1e-5)
+            return self.by_view(("Layer Weight", ior), lambda c, behind: fresnel(c, 1 / ior if behind else ior))
+        blend = min(max(blend, 0.0), 1 - 1e-5)
+        power = 2 * blend if blend < 0.5 else 0.5 / (1 - blend)
+        return self.by_view(("Facing", power), lambda c, behind: 1 - c ** power)
+
+    def _new_geometry(self, node, output, stack):
+        if output.name == "Backfacing":
+            return self.by_view(("Backfacing",), lambda c, behind: np.full_like(c, float(behind)))
+        return self._unknown(node, output, stack)
 
     def _light_path(self, node, output, stack):
         self.note("Light Path", "Nodes that depend on the ray, taken as for the camera's")

@@ -86,20 +86,20 @@ def cases():
     yield "metal 0.9, single scattering", principled("Metal", False, **{"Base Color": GOLD, "Metallic": 1.0, "Roughness": 0.9})[0], False, 0.05
     yield "mirror", principled("Mirror", **{"Base Color": GOLD, "Metallic": 1.0, "Roughness": 0.0})[0], False, 0.02
     for roughness in (0.2, 0.5, 0.9):
-        yield f"coated diffuse {roughness}", principled("Plastic", **{"Base Color": RED, "Roughness": roughness})[0], False, 0.06
-    yield "coat over black 0.3", principled("Black", **{"Base Color": (0, 0, 0), "Roughness": 0.3})[0], False, 0.1
-    yield "no coat", principled("Matte", **{"Base Color": RED, SPECULAR: 0.0, "Roughness": 1.0})[0], False, 0.035
-    yield "clear coat 0.03 over red", principled("Paint", **{"Base Color": RED, "Roughness": 0.6, COAT: 1.0, COAT_ROUGHNESS: 0.03})[0], False, 0.06
-    yield "clear coat 0.3 over red", principled("Paint", **{"Base Color": RED, "Roughness": 0.6, COAT: 1.0, COAT_ROUGHNESS: 0.3})[0], False, 0.035
+        yield f"coated diffuse {roughness}", principled("Plastic", **{"Base Color": RED, "Roughness": roughness})[0], False, 0.03
+    yield "coat over black 0.3", principled("Black", **{"Base Color": (0, 0, 0), "Roughness": 0.3})[0], False, 0.02
+    yield "no coat", principled("Matte", **{"Base Color": RED, SPECULAR: 0.0, "Roughness": 1.0})[0], False, 0.01
+    yield "clear coat 0.03 over red", principled("Paint", **{"Base Color": RED, "Roughness": 0.6, COAT: 1.0, COAT_ROUGHNESS: 0.03})[0], False, 0.025
+    yield "clear coat 0.3 over red", principled("Paint", **{"Base Color": RED, "Roughness": 0.6, COAT: 1.0, COAT_ROUGHNESS: 0.3})[0], False, 0.025
     yield "clear coat 0.03 over metal", principled("Car", False, **{"Base Color": GOLD, "Metallic": 1.0, "Roughness": 0.5, COAT: 1.0, COAT_ROUGHNESS: 0.03})[0], False, 0.09
-    yield "clear coat 0.03 alone", principled("Lacquer", **{"Base Color": (0, 0, 0), SPECULAR: 0.0, "Roughness": 1.0, COAT: 1.0, COAT_ROUGHNESS: 0.03})[0], False, 0.2
+    yield "clear coat 0.03 alone", principled("Lacquer", **{"Base Color": (0, 0, 0), SPECULAR: 0.0, "Roughness": 1.0, COAT: 1.0, COAT_ROUGHNESS: 0.03})[0], False, 0.1
     yield "glass", glass("Glass", 0.0), False, 0.025
     yield "rough glass 0.2", glass("Frosted", 0.2), False, 0.035
     yield "rough glass 0.5", glass("Frosted", 0.5), False, 0.065
     yield "rough glass 0.9", glass("Frosted", 0.9), False, 0.33
     yield "rough glass 0.5, single scattering", glass("Frosted", 0.5, multi=False), False, 0.15
-    yield "coloured glass", glass("Bottle", 0.0, (0.5, 0.8, 0.6)), False, 0.36
-    yield "principled glass", principled("Flask", **{"Base Color": (0.5, 0.8, 0.6), TRANSMISSION: 1.0, "Roughness": 0.0, "IOR": 1.5})[0], False, 0.035
+    yield "coloured glass", glass("Bottle", 0.0, (0.5, 0.8, 0.6)), False, 0.025
+    yield "principled glass", principled("Flask", **{"Base Color": (0.5, 0.8, 0.6), TRANSMISSION: 1.0, "Roughness": 0.0, "IOR": 1.5})[0], False, 0.02
     m, node = principled("Mapped", **{"Base Color": (0.5, 0.5, 0.5), "Roughness": 0.4, "Metallic": 1.0})
     yield "normal map", normal_mapped(m, node, picture("normals", tilted), 1.0), True, 0.035
     m, node = principled("Bumped", **{"Base Color": (0.5, 0.5, 0.5), "Roughness": 0.4, "Metallic": 1.0})

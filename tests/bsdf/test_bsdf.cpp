@@ -21,6 +21,13 @@ SurfacePoint point_of(const Rgb& kd, const Rgb& ks, float exponent, const Vec3f&
 
 const Vec3f kSlanting = normalize(Vec3f{0.2f, -0.3f, 0.9f});
 
+// Of a level surface, not of rough glass.
+Bsdf seen_from(const Vec3f& to_viewer, const Material& m) {
+  Scene scene(Scene::Config{});
+  scene.set_materials({m});
+  return scene.bsdf({{}, {0, 0, 1}, {0, 0, 1}, to_viewer, 1e-5f}, 0, {});
+}
+
 // What one pixel shows of a coated surface: base and coat.
 struct Coated {
   SurfacePoint base;
@@ -177,11 +184,11 @@ TEST(Bsdf, WhiteOfEveryRoughnessReflectsAllButAFewPercentOfEvenLight) {
         sum += albedo(p, 1) / 32;
       }
       EXPECT_LE(sum, 1.005) << "metallic " << metallic << " roughness " << roughness;
-      EXPECT_GE(sum, metallic > 0 ? 0.985 : 0.975) << "metallic " << metallic << " roughness " << roughness;
+      EXPECT_GE(sum, 0.985) << "metallic " << metallic << " roughness " << roughness;
     }
 }
 
-// The even part of rough metal alone is not: the view's factor is what single reflection loses, the light's is a fit.
+// The even part is to 2 %: the view's factor is what coat or single reflection leave, the light's is a fit to that.
 TEST(Bsdf, GgxIsReciprocal) {
   Rng rng(5, Stage::test);
   for (int i = 0; i < 4000; ++i) {
@@ -194,13 +201,100 @@ TEST(Bsdf, GgxIsReciprocal) {
     if (dot(b, normal) < 0) b = -b;
     if (dot(a, normal) < 0.02f || dot(b, normal) < 0.02f) continue;
     const Rgb base{rng.next_float(), rng.next_float(), rng.next_float()};
-    const Rgb there = reflectance(ggx_point(base, roughness, metallic, ior, a, normal), b),
-              back = reflectance(ggx_point(base, roughness, metallic, ior, b, normal), a);
-    // As light: of a metal of roughness up to 0.4 less than two hundredths of what comes in, edge-on.
+    SurfacePoint from_a = ggx_point(base, roughness, metallic, ior, a, normal),
+                 from_b = ggx_point(base, roughness, metallic, ior, b, normal);
+    const Rgb there = reflectance(from_a, b), back = reflectance(from_b, a);
+    from_a.diffuse = from_b.diffuse = {};
+    const Rgb gloss_there = reflectance(from_a, b), gloss_back = reflectance(from_b, a);
+    // As light: edge-on, of metals of roughness up to 0.4, less than two hundredths of what comes in.
     const float light = dot(a, normal) * dot(b, normal) * 3.1416f;
-    for (int k = 0; k < 3; ++k)
-      EXPECT_NEAR(there[k] * light, back[k] * light, (2e-3f * there[k] + 1e-5f) * light + (metal ? 0.02f : 0.0f))
-          << roughness;
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(gloss_there[k] * light, gloss_back[k] * light, (2e-3f * gloss_there[k] + 1e-5f) * light) << roughness;
+      EXPECT_NEAR(there[k] * light, back[k] * light, 2e-3f * there[k] * light + 0.02f) << roughness;
+    }
+  }
+}
+
+Material burley(const Rgb& base, float roughness) {
+  Material m;
+  m.lobe = LobeModel::ggx, m.burley = true, m.diffuse = base, m.roughness = roughness;
+  return m;
+}
+
+Vec3f direction_at(double cosine, double azimuth) {
+  const double sine = std::sqrt(1 - cosine * cosine);
+  return {static_cast<float>(sine * std::cos(azimuth)), static_cast<float>(sine * std::sin(azimuth)),
+          static_cast<float>(cosine)};
+}
+
+// As the paper writes it, with the half vector. [Burley 2012, 5.3]
+double burley_brdf(double roughness, const Vec3f& view, const Vec3f& light) {
+  const double difference = dot(light, normalize(view + light)), f90 = 0.5 + 2 * roughness * difference * difference;
+  return std::numbers::inv_pi * (1 + (f90 - 1) * std::pow(1 - light.z, 5)) * (1 + (f90 - 1) * std::pow(1 - view.z, 5));
+}
+
+TEST(Bsdf, BurleysDiffuseIsThePapersAndReciprocal) {
+  Rng rng(31, Stage::test);
+  for (int i = 0; i < 2000; ++i) {
+    const Material m = burley({0.8f, 0.5f, 0.2f}, rng.next_float());
+    const Vec3f view = direction_at(0.02 + 0.98 * rng.next_float(), 6.28 * rng.next_float()),
+                light = direction_at(0.02 + 0.98 * rng.next_float(), 6.28 * rng.next_float());
+    const Rgb there = seen_from(view, m).evaluate(light), back = seen_from(light, m).evaluate(view);
+    const double expected = burley_brdf(m.roughness, view, light);
+    for (int k = 0; k < 3; ++k) {
+      ASSERT_NEAR(there[k], m.diffuse[k] * expected, 1e-5);
+      ASSERT_NEAR(there[k], back[k], 1e-5);
+    }
+  }
+}
+
+TEST(Bsdf, VirtualLightsOfBurleysDiffuseCarryWhatItReflects) {
+  for (const float roughness : {0.0f, 0.3f, 0.7f, 1.0f}) {
+    const Material m = burley({1, 1, 1}, roughness);
+    double even = 0;
+    for (int v = 0; v < 32; ++v) {
+      const double cosine = std::sqrt((v + 0.5) / 32);
+      const Vec3f view = direction_at(cosine, 0);
+      double reflected = 0;
+      constexpr int kCosines = 200, kTurns = 64;
+      for (int i = 0; i < kCosines; ++i)
+        for (int j = 0; j < kTurns; ++j)
+          reflected +=
+              burley_brdf(roughness, view, direction_at(std::sqrt((i + 0.5) / kCosines), 6.2831853 * j / kTurns));
+      reflected *= std::numbers::pi / (kCosines * kTurns);
+      const Bsdf bsdf = seen_from(view, m);
+      EXPECT_NEAR(bsdf.lambertian_intensity({1, 1, 1}).x * std::numbers::pi, reflected, 2e-3)
+          << roughness << " " << cosine;
+      even += reflected / 32;
+    }
+    EXPECT_NEAR(even, 0.953 + 0.1123 * roughness, 2e-3) << "of even light";
+  }
+}
+
+TEST(Bsdf, CoatsOfBurleysSurfacesTakeNothingFromThem) {
+  Material m = burley({0.5f, 0.5f, 0.5f}, 0.5f), coat = m;
+  m.specular = {}, coat.specular = {1, 1, 1};
+  coat.coat = 0.25f, coat.coat_roughness = 0.3f;
+  const Vec3f view = direction_at(0.4, 0), light = direction_at(0.6, 2);
+  const Bsdf bare = seen_from(view, m), coated = seen_from(view, coat);
+  ASSERT_EQ(coated.layers().size(), 2u);
+  EXPECT_EQ(bare.layers()[0].diffuse, coated.layers()[0].diffuse);
+  EXPECT_GT(coated.evaluate(light).x, bare.evaluate(light).x);
+}
+
+TEST(Bsdf, MetalsEdgeTintIsItsColourAt82Degrees) {
+  Material m;
+  m.lobe = LobeModel::ggx, m.metallic = 1, m.roughness = 0, m.diffuse = {0.9f, 0.6f, 0.3f};
+  m.specular_tint = {1.0f, 0.7f, 0.4f};
+  Material plain = m;
+  plain.specular_tint = {1, 1, 1};
+  const auto mirrored = [](const Material& material, float cosine) {
+    const Bsdf bsdf = seen_from(direction_at(cosine, 0), material);
+    return bsdf.sample_specular(0.5f, 0.5f, 0.5f)->weight;
+  };
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(mirrored(m, 1.0f / 7)[k], m.specular_tint[k] * mirrored(plain, 1.0f / 7)[k], 1e-4f);
+    EXPECT_NEAR(mirrored(m, 1)[k], m.diffuse[k], 1e-5f) << "straight on it is the base colour";
   }
 }
 
@@ -239,7 +333,7 @@ TEST(Bsdf, ACoatAloneReflectsFresnelsFourPercentStraightOnAndMoreAtTheEdge) {
 
 // Over a base of its own fading the product of both is the same in the mean only, and lobes beneath are dimmed by what
 // the coat leaves of the view's direction alone: those are not.
-TEST(Bsdf, CoatedDiffuseIsReciprocal) {
+TEST(Bsdf, CoatedDiffuseIsReciprocalToFivePercent) {
   Rng rng(6, Stage::test);
   for (int i = 0; i < 2000; ++i) {
     Material m = lacquer(rng.next_float(), 0.1f + 0.9f * rng.next_float(), 0.5f + 0.5f * rng.next_float(), 0.0f);
@@ -251,7 +345,7 @@ TEST(Bsdf, CoatedDiffuseIsReciprocal) {
     const Vec3f a = direction(), b = direction();
     const Coated from_a = coated(m, a), from_b = coated(m, b);
     const float there = reflectance(from_a.base, b).x, back = reflectance(from_b.base, a).x;
-    EXPECT_NEAR(there / back, 1.0f, 1e-3f);
+    EXPECT_NEAR(there / back, 1.0f, 0.05f) << "to the fit of the light's factor";
     if (!from_a.coat) continue;
     const float coat_there = reflectance(*from_a.coat, b).x, coat_back = reflectance(*from_b.coat, a).x;
     EXPECT_NEAR(coat_there, coat_back, 2e-3f * coat_there + 1e-5f);
@@ -301,10 +395,7 @@ TEST(Bsdf, ATranslucentSheetSpreadsWhatItReflectsAndWhatItPassesEachToItsSide) {
   cloth.diffuse = {}, cloth.translucency = {0.6f, 0.7f, 0.8f};
   for (const Material& m : {paper, leaf, cloth})
     for (const float side : {1.0f, -1.0f}) {
-      Scene scene(Scene::Config{});
-      scene.set_materials({m});
-      const Vec3f view = normalize(Vec3f{0.5f, 0.2f, 0.8f * side});
-      const Bsdf bsdf = scene.bsdf({{}, {0, 0, 1}, {0, 0, 1}, view, 1e-5f}, 0, {});
+      const Bsdf bsdf = seen_from(normalize(Vec3f{0.5f, 0.2f, 0.8f * side}), m);
       const SurfacePoint other = bsdf.layers().back();
       EXPECT_LT(other.position.z * side, 0.0f) << "its shadow rays start on the other side";
       EXPECT_LT(other.normal.z * side, 0.0f);
@@ -331,7 +422,7 @@ TEST(Bsdf, ATranslucentSheetSpreadsWhatItReflectsAndWhatItPassesEachToItsSide) {
         EXPECT_NEAR(sampled[k], integral[k], 0.01);
         EXPECT_NEAR(carried[k], integral[k], 0.01);
       }
-      EXPECT_NEAR(density, 1.0, 0.02);
+      EXPECT_NEAR(density, 1.0, 0.03) << "but for glossy samples below the horizon";
     }
 }
 

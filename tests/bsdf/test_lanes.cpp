@@ -25,6 +25,12 @@ void ReflectanceOf(const ShadePoints& points, size_t p, const Vec3f& to_light, f
   rgb[0] = hn::GetLane(f.x), rgb[1] = hn::GetLane(f.y), rgb[2] = hn::GetLane(f.z);
 }
 
+void FresnelShareOf(float cosine, float low, float ratio, float high, float* out) {
+  const D d;
+  out[0] = hn::GetLane(FresnelShare(d, hn::Set(d, cosine), hn::Set(d, ratio)));
+  out[1] = hn::GetLane(BoundOfFresnelShare(d, hn::Set(d, cosine), hn::Set(d, low), hn::Set(d, high)));
+}
+
 void DiffuseFalloffOf(float falloff, float cosine, float* out) {
   const D d;
   out[0] = hn::GetLane(DiffuseFalloff(d, hn::Set(d, falloff), hn::Set(d, cosine)));
@@ -38,6 +44,7 @@ HWY_AFTER_NAMESPACE();
 namespace lumicut {
 HWY_EXPORT(ReflectanceOf);
 HWY_EXPORT(DiffuseFalloffOf);
+HWY_EXPORT(FresnelShareOf);
 
 namespace {
 
@@ -55,7 +62,8 @@ SurfacePoint random_point(Rng& rng, int kind) {
     p.shape = std::pow(1000.0f, rng.next_float());
   } else {
     p.lobe = kLobe<GgxReflection>, p.shape = std::pow(kLeastAlpha, rng.next_float());
-    p.grazing = color(), p.falloff = rng.next_float();
+    p.grazing = color(), p.falloff = rng.next_float(), p.ior = 0.5f + 4.0f * rng.next_float();
+    if (rng.next_below(2) == 0) p.retro = 2.0f * rng.next_float(), p.dim = 0.5f;
   }
   return p;
 }
@@ -79,6 +87,36 @@ TEST(Lanes, EachLobeIsItsScalarForm) {
       for (int k = 0; k < 3; ++k)
         ASSERT_NEAR(rgb[k], expected[k], (kind == 2 ? 1e-3f : 1e-4f) * (1.0f + expected[k])) << kind << " " << i;
     }
+}
+
+// From the two amplitudes, in double precision. [Fresnel; Snell]
+double fresnel(double cosine, double ratio) {
+  const double sine2 = (1 - cosine * cosine) / (ratio * ratio);
+  if (sine2 >= 1) return 1;
+  const double beyond = std::sqrt(1 - sine2);
+  const double s = (cosine - ratio * beyond) / (cosine + ratio * beyond),
+               p = (ratio * cosine - beyond) / (ratio * cosine + beyond);
+  return 0.5 * (s * s + p * p);
+}
+
+TEST(Lanes, FresnelsShareIsTheExactReflectanceAndBoundedOverIndicesAndCosines) {
+  Rng rng(23, Stage::test);
+  for (int i = 0; i < 200000; ++i) {
+    const float ratio = i % 10 == 0 ? 0.4f + 0.55f * rng.next_float() : 1.01f + 9.0f * std::pow(rng.next_float(), 3.0f);
+    const float low = std::max(i % 10 == 0 ? 0.3f : 1.01f, ratio - rng.next_float()), high = ratio + rng.next_float();
+    const float cosine = 1e-3f + 0.999f * rng.next_float(), least = cosine * rng.next_float();
+    const double f0 = fresnel(1, ratio), exact = std::max(0.0, (fresnel(cosine, ratio) - f0) / (1 - f0));
+    // g cancels where total reflection begins: the root of 1e-7 is what is left of it.
+    const double error = ratio < 1 ? 4e-3 : 2e-5;
+    ASSERT_NEAR(fresnel_share(cosine, ratio), exact, error) << cosine << " " << ratio;
+    float out[2];
+    HWY_DYNAMIC_DISPATCH(FresnelShareOf)(cosine, ratio, ratio, ratio, out);
+    ASSERT_NEAR(out[0], exact, error) << cosine << " " << ratio;
+    ASSERT_GE(out[1], exact - 1e-6);
+    ASSERT_LE(out[1], ratio < 1 ? 1 : exact + 3e-4);
+    HWY_DYNAMIC_DISPATCH(FresnelShareOf)(least, low, ratio, high, out);
+    ASSERT_GE(out[1], exact - 1e-6) << cosine << " over " << least << ", " << ratio << " in " << low << " " << high;
+  }
 }
 
 TEST(Lanes, FalloffIsItsScalarFormAndItsOwnBound) {

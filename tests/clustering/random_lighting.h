@@ -25,6 +25,11 @@ inline SurfacePoint random_surface(Rng& rng, float half, bool glossy) {
       p.lobe = kLobe<GgxReflection>, p.shape = std::pow(0.01f, rng.next_float());
       p.specular = {rng.next_float(), rng.next_float(), rng.next_float()};
       p.grazing = {rng.next_float(), rng.next_float(), rng.next_float()}, p.falloff = rng.next_float();
+      p.ior = rng.next_below(8) == 0 ? 0.5f + 0.5f * rng.next_float() : 1.0f + 4.0f * rng.next_float();
+    }
+    if (rng.next_below(3) == 0) {
+      const float share = rng.next_float();
+      p.retro = 2.0f * rng.next_float() * share, p.dim = 0.5f * share;
     }
     if (rng.next_below(4) == 0) p.diffuse = {};
   }

@@ -248,7 +248,18 @@ TEST(SceneJson, GgxHasItsOwnParameters) {
     other["materials"].push_back(material);
     return error_of([&] { read_scene(folder.write("wrong.json", other.dump())); });
   };
+  scene["materials"].push_back(
+      {{"name", "old"}, {"model", "ggx"}, {"burley", true}, {"specular_tint", {0.5, 0.6, 0.7}}});
+  const lumicut_material old = read_scene(folder.write("scene.json", scene.dump())).materials.back().values;
+  EXPECT_EQ(old.flags, uint32_t{LUMICUT_GGX | LUMICUT_BURLEY});
+  EXPECT_EQ(old.specular_tint[2], 0.7f);
   expect_in(wrong({{"name", "a"}, {"fresnel", false}}), {"fresnel", "\"ggx\" alone"});
+  expect_in(wrong({{"name", "a"}, {"burley", true}}), {"burley", "\"ggx\" alone"});
+  expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"burley", true}, {"fresnel", false}}),
+            {"burley", "must be false"});
+  expect_in(wrong({{"name", "a"}, {"specular_tint", {1, 1, 1}}}), {"specular_tint", "\"ggx\" alone"});
+  expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"specular_tint", {1, 1, 0}}}), {"specular_tint", "0"});
+  expect_in(wrong({{"name", "a"}, {"translucency", {0, 0, 1.5}}}), {"translucency", "1.5"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"fresnel", false}, {"metallic", 0.5}}), {"metallic", "must be 0"});
   expect_in(wrong({{"name", "a"}, {"roughness", 0.5}}), {"roughness", "\"ggx\" alone"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"shininess", 5}}), {"shininess", "not of the model \"ggx\""});

@@ -163,6 +163,10 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
       {[](M& m) { m.coat_roughness = -0.5f; }, "lumicut_material[3].coat_roughness: -0.5 is not in [0, 1]"},
       {[](M& m) { m.coat_ior = 0.5f; }, "lumicut_material[3].coat_ior: 0.5 is not in [1, 10]"},
       {[](M& m) { m.flags = LUMICUT_PHONG | LUMICUT_GGX; }, "lumicut_material[3].flags: holds both"},
+      {[](M& m) { m.specular_tint[1] = 1.5f; }, "lumicut_material[3].specular_tint[1]: 1.5 is not in [0, 1]"},
+      {[](M& m) { m.flags = LUMICUT_BURLEY; }, "lumicut_material[3].flags: holds LUMICUT_BURLEY without LUMICUT_GGX"},
+      {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_BURLEY | LUMICUT_NO_FRESNEL; },
+       "lumicut_material[3].flags: holds both LUMICUT_BURLEY and LUMICUT_NO_FRESNEL"},
       {[](M& m) { m.flags = LUMICUT_NO_FRESNEL; }, "lumicut_material[3].flags: holds LUMICUT_NO_FRESNEL without"},
       {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_NO_FRESNEL, m.metallic = 1; },
        "lumicut_material[3].metallic: must be 0 with"},
@@ -243,7 +247,9 @@ TEST(Errors, FieldsOfMeshesTexturesCamerasAndEnvironmentsAreCheckedByNameAndValu
   refused_texture([](auto& t) { t.channels = 5; }, LUMICUT_INVALID_ARGUMENT, "lumicut_texture[0].channels: 5");
   refused_texture([](auto& t) { t.format = 2; }, LUMICUT_INVALID_ARGUMENT, "lumicut_texture[0].format: 2");
   refused_texture([](auto& t) { t.pixels = nullptr; }, LUMICUT_INVALID_ARGUMENT, "lumicut_texture[0].pixels: is NULL");
-  refused_texture([](auto& t) { t.flags = 8; }, LUMICUT_UNSUPPORTED, "lumicut_texture[0].flags: 8");
+  refused_texture([](auto& t) { t.flags = 16; }, LUMICUT_UNSUPPORTED, "lumicut_texture[0].flags: 16");
+  refused_texture([](auto& t) { t.flags = LUMICUT_BY_VIEW, t.width = 1; }, LUMICUT_INVALID_ARGUMENT,
+                  "lumicut_texture[0].width: 1 is not even");
 
   const auto refused_camera = [&](const std::function<void(lumicut_camera&)>& spoil, const char* text) {
     auto c = camera();

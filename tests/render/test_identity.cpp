@@ -79,7 +79,7 @@ size_t expect_every_field_counts(const T& value) {
   }
 }
 
-TEST(Identity, EveryFieldOfAMaterialCounts) { EXPECT_EQ(expect_every_field_counts(Material{}), 36u); }
+TEST(Identity, EveryFieldOfAMaterialCounts) { EXPECT_EQ(expect_every_field_counts(Material{}), 40u); }
 TEST(Identity, EveryFieldOfALightCounts) { EXPECT_EQ(expect_every_field_counts(Light{}), 26u); }
 TEST(Identity, EveryFieldOfAnEnvironmentCounts) { EXPECT_EQ(expect_every_field_counts(Environment{}), 15u); }
 TEST(Identity, EveryFieldOfACameraCounts) { EXPECT_EQ(expect_every_field_counts(Camera{}), 22u); }
@@ -100,8 +100,8 @@ TEST(Identity, EveryFieldOfAMeshCounts) {
 TEST(Identity, EveryFieldOfATextureCounts) {
   const uint8_t bytes[] = {1, 2};
   const float floats[] = {1, 2};
-  EXPECT_EQ(expect_every_field_counts(Texture(2, 1, 1, Texture::Format::uint8, {}, bytes)), 10u);
-  EXPECT_EQ(expect_every_field_counts(Texture(2, 1, 1, Texture::Format::float32, {}, floats)), 10u);
+  EXPECT_EQ(expect_every_field_counts(Texture(2, 1, 1, Texture::Format::uint8, {}, bytes)), 11u);
+  EXPECT_EQ(expect_every_field_counts(Texture(2, 1, 1, Texture::Format::float32, {}, floats)), 11u);
 }
 TEST(Identity, EveryFieldOfLightTracingCounts) { EXPECT_EQ(expect_every_field_counts(VplOptions{}), 6u); }
 TEST(Identity, EveryFieldOfALightProfileCounts) {

@@ -294,6 +294,27 @@ TEST(Scene, TexturesOfRoughnessAndMetalMultiplyGreenAndBlue) {
   EXPECT_EQ(max_component(of_sharp.layers()[0].specular), 0.0f);
 }
 
+TEST(Scene, TexturesByViewAreLookedUpByTheSideAndTheCosineToTheViewer) {
+  // Back, straight on to edge-on; front, edge-on to straight on.
+  const float texels[8] = {0.1f, 0.2f, 0.3f, 0.4f, 0.5f, 0.6f, 0.7f, 0.8f};
+  Texture::Options by_view;
+  by_view.by_view = by_view.clamp = true;
+  const Texture table(8, 1, 1, Texture::Format::float32, by_view, texels);
+  Material m = test::diffuse(1, 1, 1);
+  m.diffuse_texture = 0;
+  const auto scene = square(m, {table});
+  const SurfaceHit hit = above(*scene, 0.3f, 0.6f);
+  for (const float cosine : {0.0f, 0.25f, 1.0f / 3, 0.8f, 1.0f})
+    for (const float side : {1.0f, -1.0f}) {
+      const Vec3f view{std::sqrt(1 - cosine * cosine), 0, cosine * side};
+      if (cosine == 0.0f && side < 0) continue;  // neither side
+      const float expected = side > 0 ? 0.5f + 0.3f * cosine : 0.4f - 0.3f * cosine;
+      EXPECT_NEAR(scene->interaction(hit, view).bsdf.albedo().x, expected, 1e-5f) << cosine << " " << side;
+    }
+  m.diffuse_texture = -1, m.emission_texture = 0, m.emission = {1, 1, 1};
+  EXPECT_NE(error_of([&] { square(m, {table}); }).find("emission_texture = 0 is a texture by view"), std::string::npos);
+}
+
 TEST(Scene, FactorsAboveOneStayUntilTheTextureHasMultipliedThem) {
   const float texels[6] = {0.5f, 0.25f, 0.9f, 4.0f, -1.0f, 0.5f};
   Material m = test::diffuse(1.5f, 2.0f, 1.25f);

@@ -118,7 +118,9 @@ typedef struct lumicut_material {
   int32_t diffuse_texture, specular_texture, opacity_texture, emission_texture; /* 1 + index into the textures; 0: none. Factors multiply */
   /* LUMICUT_GGX alone: diffuse is the base colour, specular multiplies the dielectric's reflectance ((ior-1)/(ior+1))^2.
      With LUMICUT_NO_FRESNEL specular is the lobe's reflectance at every angle, beside a Lambertian diffuse (which shading
-     trees call a mix of diffuse and glossy): diffuse + specular <= 1 keeps energy; no metallic, transmission */
+     trees call a mix of diffuse and glossy): diffuse + specular <= 1 keeps energy; no metallic, transmission.
+     With LUMICUT_BURLEY the diffuse part is Burley's (2012), and coats add to it without taking from it: Blender's
+     Principled shader before 4.0. It may reflect more than it gets */
   float roughness;         /* 0..1; the distribution's alpha is its square */
   float metallic;          /* 0..1 */
   float ior;               /* 0.1..10; 0: not given, taken as 1.5 */
@@ -137,8 +139,10 @@ typedef struct lumicut_material {
   /* Any model */
   float translucency[3];   /* as diffuse: share of the light that leaves evenly on the other side; diffuse + translucency <= 1 keeps energy */
   int32_t translucency_texture; /* 1 + index; 0: none. Multiplies */
+  /* LUMICUT_GGX alone */
+  float specular_tint[3];      /* 0..1: of metal at 82 degrees, over its colour there; of what glass reflects; all 0: not given, taken as 1 */
 } lumicut_material;
-enum { LUMICUT_EMIT_BOTH_SIDES = 1, LUMICUT_PHONG = 2, LUMICUT_GGX = 4, LUMICUT_NO_FRESNEL = 8 };
+enum { LUMICUT_EMIT_BOTH_SIDES = 1, LUMICUT_PHONG = 2, LUMICUT_GGX = 4, LUMICUT_NO_FRESNEL = 8, LUMICUT_BURLEY = 16 };
 
 typedef struct lumicut_mesh {
   uint32_t struct_size;
@@ -271,11 +275,15 @@ typedef struct lumicut_texture {
   uint32_t width, height;
   uint32_t channels; /* 1..4 */
   uint32_t format;   /* LUMICUT_UINT8 (0..255 -> 0..1) or LUMICUT_FLOAT32 */
-  uint32_t flags;    /* LUMICUT_SRGB: decode; LUMICUT_CLAMP: no repeat; LUMICUT_NEAREST: no filter */
+  uint32_t flags;    /* LUMICUT_SRGB: decode; LUMICUT_CLAMP: no repeat; LUMICUT_NEAREST: no filter; LUMICUT_BY_VIEW: below */
   const void* pixels; /* row 0 is the top row (v = 1), rows packed */
 } lumicut_texture;
 enum { LUMICUT_UINT8 = 0, LUMICUT_FLOAT32 = 1 };
-enum { LUMICUT_SRGB = 1, LUMICUT_CLAMP = 2, LUMICUT_NEAREST = 4 };
+/* With LUMICUT_BY_VIEW the texture is looked up by how the surface is seen, not by uv: its right half is for the front, from
+   edge-on to straight on (u by the cosine to the shading normal, between the centres of that half's first and last texels),
+   its left half, mirrored, for the back. The width is even. For Fresnel mixes and the like; not for emission, opacity,
+   normal, height and environment textures */
+enum { LUMICUT_SRGB = 1, LUMICUT_CLAMP = 2, LUMICUT_NEAREST = 4, LUMICUT_BY_VIEW = 8 };
 
 /* Intensity by direction, as photometric files have it: bilinear between its angles, 0 beyond the vertical ones. */
 typedef struct lumicut_profile {

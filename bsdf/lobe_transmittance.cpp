@@ -1,0 +1,132 @@
+#include "bsdf/lobe_transmittance.h"
+
+#include <array>
+
+#include "bsdf/facet_integral.h"
+
+namespace lumicut {
+
+namespace {
+
+constexpr int kRoughness = 14, kRatios = 18, kCosines = 17;  // steps in √α, in F0's fourth root and in √cosine
+constexpr float kLargestRoot = 0.85f;                        // of F0: an index of 12.3
+
+// Directional albedo of a lobe, and its nearest straight + rise·(1 − c)⁴, of the same mean over even light.
+struct Albedo {
+  std::array<float, kCosines> at{};
+  float straight = 0.0f, rise = 0.0f;
+
+  // Of a lobe whose facets reflect `share(v·h)`.
+  template <typename Share>
+  static Albedo of(float alpha, const Share& share) {
+    Albedo a;
+    for (int i = 0; i < kCosines; ++i)
+      a.at[i] = mean_over_facets<12>(alpha, cosine(i), [&](const Vec3f& view, const Vec3f& h) {
+        return share(std::min(1.0f, std::max(0.0f, dot(view, h)))) * unmasked_reflection(alpha, view, h);
+      });
+    float mean = 0.0f, mean_edge = 0.0f, mixed = 0.0f, square = 0.0f;
+    for (int i = 0; i < kCosines; ++i) {
+      const float c = cosine(i), edge = 1.0f - diffuse_falloff(1.0f, c);
+      // Of the cosine's projected solid angle, c dc, in steps of its root.
+      const float weight = c * std::sqrt(c) * (i + 1 == kCosines ? 0.5f : 1.0f) * (4.0f / (kCosines - 1));
+      mean += weight * a.at[i], mean_edge += weight * edge, mixed += weight * a.at[i] * edge;
+      square += weight * edge * edge;
+    }
+    a.rise = (mixed - mean * mean_edge) / (square - mean_edge * mean_edge);
+    a.straight = mean - a.rise * mean_edge;
+    return a;
+  }
+  static float cosine(int i) {
+    const float root = static_cast<float>(i) / (kCosines - 1);
+    return std::max(1e-3f, root * root);
+  }
+};
+
+struct Place {
+  int cell;
+  float rest;
+};
+Place place_of(float x, int steps) {
+  const float at = std::min(1.0f, std::max(0.0f, x)) * static_cast<float>(steps - 1);
+  const int cell = std::min(steps - 2, static_cast<int>(at));
+  return {cell, at - static_cast<float>(cell)};
+}
+
+// What is looked up of an Albedo, linear in it.
+struct Seen {
+  float albedo, straight, rise;
+};
+Seen between(const Seen& a, const Seen& b, float f) {
+  return {a.albedo + (b.albedo - a.albedo) * f, a.straight + (b.straight - a.straight) * f,
+          a.rise + (b.rise - a.rise) * f};
+}
+
+class RoughnessRow {
+ public:
+  template <typename Share>
+  void fill(const Share& share) {
+    for (int r = 0; r < kRoughness; ++r) {
+      const float root = static_cast<float>(r) / (kRoughness - 1);
+      of_[r] = Albedo::of(root * root, share);
+    }
+  }
+  Seen seen(const Place& r, const Place& c) const {
+    const auto one = [&](const Albedo& a) {
+      return Seen{a.at[c.cell] + (a.at[c.cell + 1] - a.at[c.cell]) * c.rest, a.straight, a.rise};
+    };
+    return between(one(of_[r.cell]), one(of_[r.cell + 1]), r.rest);
+  }
+
+ private:
+  std::array<Albedo, kRoughness> of_;
+};
+
+// Lobes that reflect Fresnel's share for indices above 1, or below.
+class ShareTable {
+ public:
+  explicit ShareTable(bool thinner) {
+    for (int k = 0; k < kRatios; ++k) {
+      const float step = static_cast<float>(k) / (kRatios - 1), root = kLargestRoot * step * step;
+      const float ior = thinner ? (1.0f - root) / (1.0f + root) : (1.0f + root) / (1.0f - root);
+      rows_[k].fill([ior](float cosine) { return fresnel_share(cosine, ior); });
+    }
+  }
+  Seen seen(const Place& k, const Place& r, const Place& c) const {
+    return between(rows_[k.cell].seen(r, c), rows_[k.cell + 1].seen(r, c), k.rest);
+  }
+
+ private:
+  std::array<RoughnessRow, kRatios> rows_;
+};
+
+const ShareTable& shares_of(float ior) {
+  if (ior < 1.0f) {
+    static const ShareTable thinner(true);
+    return thinner;
+  }
+  static const ShareTable denser(false);
+  return denser;
+}
+
+const RoughnessRow& mirrors() {
+  static const RoughnessRow row = [] {
+    RoughnessRow all;
+    all.fill([](float) { return 1.0f; });
+    return all;
+  }();
+  return row;
+}
+
+}  // namespace
+
+LobeTransmittance lobe_transmittance(float f0, float f90, float ior, float alpha, float cosine) {
+  const Place r = place_of(std::sqrt(std::max(0.0f, alpha)), kRoughness),
+              c = place_of(std::sqrt(std::max(0.0f, cosine)), kCosines),
+              k = place_of(std::sqrt(std::abs(ior - 1.0f) / (ior + 1.0f) / kLargestRoot), kRatios);
+  const Seen all = mirrors().seen(r, c), share = shares_of(ior).seen(k, r, c);
+  const float rest = f90 - f0, normal = 1.0f - f0 * all.straight - rest * share.straight;
+  const float falloff = normal > 0.0f ? (f0 * all.rise + rest * share.rise) / normal : 0.0f;
+  return {std::max(0.0f, 1.0f - f0 * all.albedo - rest * share.albedo), std::min(1.0f, std::max(0.0f, falloff))};
+}
+
+}  // namespace lumicut
