@@ -47,12 +47,22 @@ struct RayHit {
   Hit hit;
 };
 
-// Cut-outs and partial transparency. Called for each candidate hit on a mesh with `has_cutout`, concurrently.
+// Where an occlusion query's ray meets a surface. `dir`, of any length, is in the mesh's own space.
+struct LightHit {
+  uint32_t mesh, inst, prim;  // as in Hit
+  float u, v;
+  Vec3f dir;
+};
+
+// Cut-outs, partial transparency, and glass that light passes straight. Called for each candidate hit on a mesh that is
+// marked for it, concurrently. Must always return the same for the same place (and direction).
 class HitFilter {
  public:
   virtual ~HitFilter() = default;
-  // True where the ray passes through the surface. Must always return the same for the same place.
+  // True where any ray passes through the surface: meshes with `has_cutout`.
   virtual bool passes(uint32_t mesh, uint32_t prim, float u, float v) const = 0;
+  // The same for rays of occlusion queries, of meshes with `has_cutout` or `passes_light`.
+  virtual bool passes_light(const LightHit& hit) const { return passes(hit.mesh, hit.prim, hit.u, hit.v); }
 };
 
 // Views of the caller's memory, which must outlive the Accel.
@@ -63,6 +73,7 @@ struct MeshView {
   size_t triangle_count = 0;
   uint32_t mask = 0xffffffffu;
   bool has_cutout = false;
+  bool passes_light = false;  // occlusion queries may pass where closest hits do not
 };
 
 struct InstanceView {
@@ -96,7 +107,7 @@ class Accel {
   // Closest hits. Rays with NaN fields, or an origin or direction past 1.844e18, hit nothing.
   virtual void intersect(std::span<RayHit> rays) const = 0;
 
-  // Any hit: sets tfar to -inf where something lies in (tnear, tfar).
+  // Any hit: sets tfar to -inf where something that stops light lies in (tnear, tfar).
   virtual void occluded(std::span<Ray> rays) const = 0;
 
   // The hot call of the renderer: one light, many nearby points (structure of arrays). Tests the open segments

@@ -91,14 +91,15 @@ std::unique_ptr<Bvh> Bvh::from_geometry(const AccelGeometry& geometry, const Acc
   std::unique_ptr<Bvh> bvh(new Bvh);
   bool filters = false;
   for (const MeshView& mesh : geometry.meshes) {
-    bvh->has_cutout_.push_back(mesh.has_cutout ? 1 : 0);
+    const int filtered = (mesh.has_cutout ? kFilterAll | kFilterLight : 0) | (mesh.passes_light ? kFilterLight : 0);
+    bvh->filtered_.push_back(static_cast<uint8_t>(filtered));
     bvh->mesh_masks_.push_back(mesh.mask);
-    filters |= mesh.has_cutout;
+    filters |= filtered != 0;
     bvh->scene_.masks |= mesh.mask != 0xffffffffu;
   }
   bvh->scene_.robust = options.robust;
   bvh->scene_.filter = filters ? geometry.filter : nullptr;
-  bvh->scene_.has_cutout = bvh->has_cutout_.data();
+  bvh->scene_.filtered = bvh->filtered_.data();
   bvh->scene_.mesh_masks = bvh->mesh_masks_.data();
   AccelInfo& info = bvh->info_;
   if (geometry.instances.empty()) {

@@ -49,7 +49,7 @@ class Bvh final : public Accel {
   WideBvh top_;
   std::vector<WideBvh> meshes_;  // by mesh, where there are instances
   std::vector<TraceScene::Instance> instances_;
-  std::vector<uint8_t> has_cutout_;
+  std::vector<uint8_t> filtered_;
   std::vector<uint32_t> mesh_masks_;
 };
 

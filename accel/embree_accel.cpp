@@ -57,7 +57,7 @@ struct FilterUser {
   uint32_t mesh = 0;
 };
 
-// Called for one ray or for a packet.
+// Both are called for one ray or for a packet.
 void on_filter(const RTCFilterFunctionNArguments* args) {
   const auto& user = *static_cast<const FilterUser*>(args->geometryUserPtr);
   for (unsigned i = 0; i < args->N; ++i) {
@@ -65,6 +65,22 @@ void on_filter(const RTCFilterFunctionNArguments* args) {
     if (user.filter->passes(user.mesh, RTCHitN_primID(args->hit, args->N, i), RTCHitN_u(args->hit, args->N, i),
                             RTCHitN_v(args->hit, args->N, i)))
       args->valid[i] = 0;
+  }
+}
+// Of occlusion queries. Embree has taken the ray to the mesh's space.
+void on_light_filter(const RTCFilterFunctionNArguments* args) {
+  const auto& user = *static_cast<const FilterUser*>(args->geometryUserPtr);
+  const unsigned n = args->N;
+  for (unsigned i = 0; i < n; ++i) {
+    if (args->valid[i] == 0) continue;
+    const LightHit hit{
+        user.mesh,
+        RTCHitN_instID(args->hit, n, i, 0),
+        RTCHitN_primID(args->hit, n, i),
+        RTCHitN_u(args->hit, n, i),
+        RTCHitN_v(args->hit, n, i),
+        {RTCRayN_dir_x(args->ray, n, i), RTCRayN_dir_y(args->ray, n, i), RTCRayN_dir_z(args->ray, n, i)}};
+    if (user.filter->passes_light(hit)) args->valid[i] = 0;
   }
 }
 
@@ -224,10 +240,10 @@ class EmbreeAccel final : public Accel {
     rtcSetSharedGeometryBuffer(geom, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.indices, 0, 3 * sizeof(uint32_t),
                                mesh.triangle_count);
     rtcSetGeometryMask(geom, mesh.mask);
-    if (mesh.has_cutout && geometry.filter != nullptr) {
+    if ((mesh.has_cutout || mesh.passes_light) && geometry.filter != nullptr) {
       rtcSetGeometryUserData(geom, &filters_[id]);
-      rtcSetGeometryIntersectFilterFunction(geom, on_filter);
-      rtcSetGeometryOccludedFilterFunction(geom, on_filter);
+      if (mesh.has_cutout) rtcSetGeometryIntersectFilterFunction(geom, on_filter);
+      rtcSetGeometryOccludedFilterFunction(geom, on_light_filter);
     }
     rtcCommitGeometry(geom);
     rtcAttachGeometryByID(scene, geom, id);

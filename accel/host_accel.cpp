@@ -1,5 +1,6 @@
 #include "accel/host_accel.h"
 
+#include <optional>
 #include <string>
 
 #include "accel/validate.h"
@@ -16,6 +17,8 @@ class HostAccel final : public Accel {
       : callbacks_(callbacks), geometry_(geometry) {
     for (const MeshView& mesh : geometry.meshes) info_.triangles += mesh.triangle_count;
     info_.bounds = bounds_of(geometry);
+    for (const MeshView& mesh : geometry.meshes) passes_light_ |= mesh.passes_light && geometry.filter != nullptr;
+    if (passes_light_) inverses_ = invert_instances(geometry).of;
   }
 
   AccelInfo info() const override { return info_; }
@@ -43,7 +46,10 @@ class HostAccel final : public Accel {
   }
 
   void occluded(std::span<Ray> rays) const override {
-    if (!rays.empty()) callbacks_.occluded(callbacks_.user, rays.data(), rays.size());
+    if (rays.empty()) return;
+    const std::vector<Ray> asked(passes_light_ ? rays.begin() : rays.end(), rays.end());
+    callbacks_.occluded(callbacks_.user, rays.data(), rays.size());
+    if (passes_light_) pass_light(asked, rays);
   }
 
   void occluded_from_point(const Vec3f& light, bool directional, const float* px, const float* py, const float* pz,
@@ -56,11 +62,51 @@ class HostAccel final : public Accel {
       rays[i].dir = directional ? light : p - light;
       rays[i].tfar = directional ? kInf : 0x1.fffffep-1f;
     }
-    callbacks_.occluded(callbacks_.user, rays.data(), rays.size());
+    HostAccel::occluded(rays);
     for (size_t i = 0; i < n; ++i) out[i] = rays[i].tfar == -kInf;
   }
 
  private:
+  // Opens again the `rays` that are stopped by nothing but glass that light passes: the host knows surfaces alone, so
+  // that its closest hits are gone through one by one.
+  void pass_light(const std::vector<Ray>& asked, std::span<Ray> rays) const {
+    constexpr int kMost = 64;
+    std::vector<RayHit> open;
+    std::vector<size_t> of;
+    for (size_t i = 0; i < rays.size(); ++i)
+      if (rays[i].tfar == -kInf) open.push_back({asked[i], {}}), of.push_back(i);
+    for (int step = 0; step < kMost && !open.empty(); ++step) {
+      intersect(open);
+      size_t left = 0;
+      for (size_t k = 0; k < open.size(); ++k) {
+        RayHit& r = open[k];
+        const size_t i = of[k];
+        if (r.hit.geom == kNoId) {
+          rays[i].tfar = asked[i].tfar;
+          continue;
+        }
+        if (!lets_pass(r)) continue;
+        r.ray.tnear = r.ray.tfar * (1.0f + 1e-5f) + 1e-12f, r.ray.tfar = asked[i].tfar;
+        if (!(r.ray.tnear < r.ray.tfar)) {
+          rays[i].tfar = asked[i].tfar;
+          continue;
+        }
+        open[left] = r, of[left++] = i;
+      }
+      open.resize(left), of.resize(left);
+    }
+  }
+  bool lets_pass(const RayHit& r) const {
+    const Hit& h = r.hit;
+    if (!geometry_.meshes[h.geom].passes_light) return false;
+    Vec3f dir = r.ray.dir;
+    if (h.inst != kNoId) {
+      if (!inverses_[h.inst]) return false;
+      dir = inverses_[h.inst]->vector(dir);
+    }
+    return geometry_.filter->passes_light({h.geom, h.inst, h.prim, h.u, h.v, dir});
+  }
+
   static bool is_traceable_to(Ray ray, float limit) {
     ray.tfar = limit;
     return is_traceable(ray, {});
@@ -88,6 +134,8 @@ class HostAccel final : public Accel {
 
   HostCallbacks callbacks_;
   AccelGeometry geometry_;
+  bool passes_light_ = false;
+  std::vector<std::optional<Transform>> inverses_;  // of the instances, where that is needed
   AccelInfo info_;
 };
 

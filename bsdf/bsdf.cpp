@@ -1,6 +1,7 @@
 #include "bsdf/bsdf.h"
 
 #include "bsdf/ggx_transmission.h"
+#include "bsdf/straight_glass.h"
 
 namespace lumicut {
 
@@ -129,27 +130,28 @@ Rgb Bsdf::lambertian_intensity(const Rgb& flux) const {
   return flux * p.diffuse * (p.burley() ? even * mean_burley_factor(p.retro, p.dim, dot(p.normal, p.mirror)) : even);
 }
 
-std::optional<BsdfSample> Bsdf::sample_specular(float choice, float u, float v) const {
+std::optional<BsdfSample> Bsdf::sample_specular(float choice, float u, float v, Passage passage) const {
   if (!specular_) return {};
-  constexpr float kSmooth = 1e-4f;  // turned by less than single precision tells
+  const bool straight = parameters_.shadows_pass && passage == Passage::straight;
   const GgxColors& c = colors_;
   const Frame frame(normal_);
   Vec3f view = frame.to_local(to_viewer_);
   if (view.z < 1e-3f) view = normalize(Vec3f{view.x, view.y, 1e-3f});  // shading normals may turn from the viewer
   const auto half_vector = [&](float alpha) {
-    return alpha < kSmooth ? Vec3f{0, 0, 1} : sample_visible_normal(view, alpha, u, v);
+    return alpha < kSmoothAlpha ? Vec3f{0, 0, 1} : sample_visible_normal(view, alpha, u, v);
   };
 
   float alpha = c.alpha;
   Vec3f h = half_vector(alpha);
   const float cosine = std::min(1.0f, std::max(0.0f, dot(view, h)));
-  const float ratio = behind_ ? 1.0f / parameters_.ior : parameters_.ior;
+  const bool inside = behind_ && !straight;
+  const float ratio = inside ? 1.0f / parameters_.ior : parameters_.ior;
   float refracted = 0.0f;
   Rgb reflected{}, passed{};
   if (c.clear > 0.0f) {
     const float border = fresnel_reflectance(cosine, ratio, refracted);
-    const bool rough = !(alpha < kSmooth) && parameters_.glass != nullptr;
-    const float clear = c.clear / (rough ? parameters_.glass->at(behind_, alpha, view.z) : 1.0f);
+    const bool rough = !(alpha < kSmoothAlpha) && parameters_.glass != nullptr;
+    const float clear = c.clear / (rough ? parameters_.glass->at(inside, alpha, view.z) : 1.0f);
     reflected += parameters_.specular_tint * (clear * border);
     // The base colour is that of two borders, as a closed body has them.
     for (int k = 0; k < 3; ++k) passed[k] = clear * (1.0f - border) * std::sqrt(std::max(0.0f, c.base[k]));
@@ -166,6 +168,7 @@ std::optional<BsdfSample> Bsdf::sample_specular(float choice, float u, float v) 
     if (smooth_coat(parameters_.coat, parameters_.coat_alpha))
       of_coat = coat_reflectance(coat, dot(view, half_vector(coat.alpha)));
   }
+  if (straight) passed = straight_transmittance(parameters_, dot(side_, to_viewer_));
   const float most_reflected = max_component(reflected), most_passed = max_component(passed);
   const float sum = most_reflected + most_passed + of_coat;
   if (!(sum > 0.0f)) return {};
@@ -180,14 +183,18 @@ std::optional<BsdfSample> Bsdf::sample_specular(float choice, float u, float v) 
   } else {
     s.weight = transmitted ? passed * (sum / most_passed) : reflected * (sum / std::max(most_reflected, 1e-30f));
   }
+  if (transmitted && straight) {
+    s.direction = -to_viewer_, s.flags = kSpecular | kTransmitted | kStraight;
+    return s;
+  }
   const Vec3f local = transmitted ? refract(view, h, cosine, ratio, refracted) : reflect(view, h);
   const float nl = transmitted ? -local.z : local.z;
   if (!(nl > 0.0f)) return {};
   s.direction = normalize(frame.to_world(local));
-  if (!transmitted && alpha < kSmooth && dot(s.direction, side_) <= 0.0f) s.direction = reflect(to_viewer_, side_);
+  if (!transmitted && alpha < kSmoothAlpha && dot(s.direction, side_) <= 0.0f) s.direction = reflect(to_viewer_, side_);
   const float away = dot(s.direction, side_);
   if (transmitted ? !(away < 0.0f) : !(away > 0.0f)) return {};
-  if (alpha >= kSmooth)
+  if (alpha >= kSmoothAlpha)
     s.weight *= transmitted ? masking_transmitted(alpha * alpha, nl) : masking_reflected(alpha * alpha, view.z, nl);
   s.flags = kSpecular | (transmitted ? kTransmitted : kReflected);
   return s;
@@ -196,7 +203,7 @@ std::optional<BsdfSample> Bsdf::sample_specular(float choice, float u, float v) 
 std::optional<ScatterSample> Bsdf::scatter(Rng& rng) const {
   if (parameters_.model != LobeModel::ggx && !translucent()) return scatter_cosine(rng);
   const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float(), lobe = rng.next_float();
-  const auto specular = sample_specular(lobe, u, v);
+  const auto specular = sample_specular(lobe, u, v, Passage::straight);
   const float q_specular = specular ? std::min(1.0f, max_component(specular->weight)) : 0.0f;
   float reflected = 0.0f;
   for (const SurfacePoint& p : layers()) reflected += largest_albedo(p);
@@ -207,7 +214,7 @@ std::optional<ScatterSample> Bsdf::scatter(Rng& rng) const {
   if (choice < p_specular) {
     // Camera paths leave out that refraction changes radiance by the square of the indices' ratio; so that both kinds of
     // paths give one image, light paths carry it. [Veach 1997, 5.2]
-    const bool refracted = (specular->flags & kTransmitted) != 0;
+    const bool refracted = (specular->flags & (kTransmitted | kStraight)) == kTransmitted;
     const float ratio = behind_ ? 1.0f / parameters_.ior : parameters_.ior;
     const float narrowed = refracted ? 1.0f / (ratio * ratio) : 1.0f;
     return ScatterSample{specular->direction, specular->weight, narrowed / p_specular, specular->flags};
@@ -249,7 +256,7 @@ PathChoice Bsdf::choose(Rng& rng) const {
   PathChoice chosen;
   if (specular_) {
     const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float(), either = rng.next_float();
-    auto s = sample_specular(choice, u, v);
+    auto s = sample_specular(choice, u, v, Passage::straight);
     // Half of the paths each way, where there are two.
     const float share = layer_count_ < 2 && PointBsdf(layers_[0]).black() ? 1.0f : 0.5f;
     if (either < share) {

@@ -39,6 +39,10 @@ struct PathChoice {
   float probability = 1.0f;  // of this choice: to divide by
 };
 
+// How a ray goes through glass: bent, as the camera sees it, or, where the material says that shadows pass, straight on, as
+// light does on its way to the first surface that is seen.
+enum class Passage : uint8_t { refracted, straight };
+
 class Bsdf {
  public:
   Bsdf() = default;
@@ -72,11 +76,15 @@ class Bsdf {
   // lobe, or where the light is lost in it. The mean weight is at most 1 (of one direction through rough glass it may be
   // more: what others lose is given back); solid angles that refraction narrows are not in it, since a closed body
   // widens them again.
-  std::optional<BsdfSample> sample_specular(float choice, float u, float v) const;
+  std::optional<BsdfSample> sample_specular(float choice, float u, float v, Passage passage = Passage::refracted) const;
   // One direction out of all lobes for a light path, with Russian roulette by what they reflect, which keeps the flux of
   // all paths alike but for that factor of refraction: here it is, so that a single sheet looks as camera paths see it.
+  // Straight through glass, where shadows pass.
   std::optional<ScatterSample> scatter(Rng& rng) const;
+  // Of a path behind the first surface that lights are sampled at: straight through glass, where shadows pass.
   PathChoice choose(Rng& rng) const;
+  // Whether some light goes straight on.
+  bool passes_straight() const { return specular_ && parameters_.shadows_pass; }
 
  private:
   std::optional<ScatterSample> scatter_cosine(Rng& rng) const;

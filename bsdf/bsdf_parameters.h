@@ -24,6 +24,7 @@ struct BsdfParameters {
   float metallic = 0.0f, ior = 1.5f, transmission = 0.0f;
   float coat = 0.0f, coat_alpha = 0.0f, coat_ior = 1.5f;  // a clear layer over all of this; `coat`: its share
   const GlassAlbedo* glass = nullptr;                     // of that ior, for rough glass
+  bool shadows_pass = false;                              // light goes straight through its glass
 };
 
 }  // namespace lumicut

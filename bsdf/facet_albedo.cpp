@@ -68,14 +68,19 @@ GlassAlbedo::GlassAlbedo(float ior) : ior_(ior), table_(2 * kRoughness * kCosine
   for (const bool inside : {false, true}) {
     const float ratio = inside ? 1.0f / ior : ior;
     fill(table_.data() + (inside ? kRoughness * kCosines : 0), [&](float alpha, float cosine_to_viewer) {
-      return mean_over_facets(alpha, cosine_to_viewer, [&](const Vec3f& view, const Vec3f& h) {
+      float all = 0.0f, through = 0.0f;
+      const float kept = mean_over_facets(alpha, cosine_to_viewer, [&](const Vec3f& view, const Vec3f& h) {
         const float cosine = std::min(1.0f, std::max(0.0f, dot(view, h)));
         float refracted = 0.0f;
         const float border = fresnel_reflectance(cosine, ratio, refracted);
         const float down = view.z / ratio - h.z * (cosine / ratio - refracted);
-        return border * unmasked_reflection(alpha, view, h) +
-               (down > 0.0f ? (1.0f - border) * masking_transmitted(alpha * alpha, down) : 0.0f);
+        const float refracted_on = down > 0.0f ? (1.0f - border) * masking_transmitted(alpha * alpha, down) : 0.0f;
+        const float share = border * unmasked_reflection(alpha, view, h) + refracted_on;
+        through += refracted_on, all += share;
+        return share;
       });
+      if (!inside) passed_.push_back(all > 0.0f ? through / all : 0.0f);
+      return kept;
     });
   }
 }
@@ -83,5 +88,7 @@ GlassAlbedo::GlassAlbedo(float ior) : ior_(ior), table_(2 * kRoughness * kCosine
 float GlassAlbedo::at(bool inside, float alpha, float cosine) const {
   return look_up(table_.data() + (inside ? kRoughness * kCosines : 0), alpha, cosine);
 }
+
+float GlassAlbedo::passed(float alpha, float cosine) const { return look_up(passed_.data(), alpha, cosine); }
 
 }  // namespace lumicut

@@ -18,10 +18,13 @@ class GlassAlbedo {
   float ior() const { return ior_; }
   // Of light to a viewer at `cosine` to the normal, from inside of the glass or outside; α of 0 to 1. To about 1.5 %.
   float at(bool inside, float alpha, float cosine) const;
+  // The part of that which is refracted, seen from outside.
+  float passed(float alpha, float cosine) const;
 
  private:
   float ior_;
   std::vector<float> table_;  // outside, inside
+  std::vector<float> passed_;
 };
 
 }  // namespace lumicut

@@ -31,7 +31,8 @@ inline float lobe_importance(const SurfacePoint& p, float cosine, float beta) {
   return with_lobe(p, [&](auto lobe) { return lobe.importance(p, cosine, beta); });
 }
 
-enum BsdfFlags : uint32_t { kReflected = 1, kTransmitted = 2, kSpecular = 4 };
+// kStraight: through glass as if it were not there; what lies behind is lit and found by shadow rays too.
+enum BsdfFlags : uint32_t { kReflected = 1, kTransmitted = 2, kSpecular = 4, kStraight = 8 };
 
 struct BsdfSample {
   Vec3f direction;     // unit

@@ -15,8 +15,9 @@ namespace lumicut {
 
 namespace {
 
-constexpr size_t kChunk = 1024;       // points
-constexpr uint32_t kSureBounces = 3;  // before chance may end a path
+constexpr size_t kChunk = 1024;         // points
+constexpr uint32_t kSureBounces = 3;    // before chance may end a path
+constexpr uint32_t kMostStraight = 64;  // passages of one path straight through glass, which count as no surface
 
 struct PathTracerParams {
   uint32_t samples = 16;
@@ -73,6 +74,9 @@ class PathTracer final : public Integrator {
     float pdf = 0.0f;
     bool specular = false;  // along a specular lobe, from `origin`: nothing else finds what it finds
     Vec3f origin{};
+    uint32_t depth = 0;      // surfaces met
+    bool straight = false;   // has come so through glass to `origin`
+    float travelled = 0.0f;  // on that way, since `point`
   };
   struct Shadow {
     Rgb light;
@@ -85,13 +89,13 @@ class PathTracer final : public Integrator {
     std::vector<Ray> shadow_rays;
     std::vector<Shadow> shadows;
     std::vector<RayHit> rays;
-    for (uint32_t depth = 0; depth <= max_depth_ && !paths.empty(); ++depth) {
+    for (uint32_t step = 0; step <= max_depth_ + kMostStraight && !paths.empty(); ++step) {
       if (context.progress.cancelled()) return;
       shadow_rays.clear(), shadows.clear(), rays.clear();
       size_t alive = 0;
       for (size_t i = 0; i < paths.size(); ++i) {
         Path path = paths[i];
-        if (path.specular) {
+        if (path.specular || path.straight) {
           RayHit ray;
           ray.ray.org = path.origin, ray.ray.dir = path.direction;
           rays.push_back(ray);
@@ -118,7 +122,7 @@ class PathTracer final : public Integrator {
       alive = 0;
       for (size_t i = 0; i < paths.size(); ++i) {
         ++counts[paths[i].index];
-        if (arrive(paths[i], rays[i], depth, radiance)) paths[alive++] = paths[i];
+        if (arrive(paths[i], rays[i], radiance)) paths[alive++] = paths[i];
       }
       paths.erase(paths.begin() + static_cast<ptrdiff_t>(alive), paths.end());
     }
@@ -166,11 +170,12 @@ class PathTracer final : public Integrator {
   }
 
   // What the path's ray found: adds what it emits; true where the path goes on from there.
-  bool arrive(Path& path, const RayHit& hit, uint32_t depth, std::span<Rgb> radiance) const {
+  bool arrive(Path& path, const RayHit& hit, std::span<Rgb> radiance) const {
     Rgb& sum = radiance[path.index];
     if (!light_surfaces_->empty())
       light_surfaces_->for_each_hit(hit.ray.org, path.direction, hit.ray.tfar, [&](const LightSurfaces::Hit& seen) {
-        const double density = sampler_->light_density(seen.light) * double{seen.t} * seen.t / seen.cosine;
+        const double distance = double{path.travelled} + seen.t;
+        const double density = sampler_->light_density(seen.light) * distance * distance / seen.cosine;
         sum += path.weight * seen.radiance * (path.specular ? 1.0f : power_heuristic(path.pdf, density));
       });
     if (hit.hit.geom == kNoId) {
@@ -182,15 +187,26 @@ class PathTracer final : public Integrator {
     }
     const SurfaceInteraction at = scene_->interaction(hit, path.point.pixel);
     // A ray that meets its own surface at once left it below the horizon of the triangle.
-    if (!path.specular && at.t < 4.0f * at.offset) return false;
+    if (!path.specular && !path.straight && at.t < 4.0f * at.offset) return false;
     if (max_component(at.emitted) > 0.0f) {
       const double cosine = std::max(1e-9f, std::abs(dot(at.geometric_normal, at.to_viewer)));
-      const double density = sampler_->mesh_density(at) * double{at.t} * at.t / cosine;
+      const double distance = double{path.travelled} + at.t;
+      const double density = sampler_->mesh_density(at) * distance * distance / cosine;
       sum += path.weight * at.emitted * (path.specular ? 1.0f : power_heuristic(path.pdf, density));
     }
-    if (depth >= max_depth_) return false;
+    const bool last = path.depth >= max_depth_;
+    if (last && !at.bsdf.passes_straight()) return false;
     const PathChoice choice = at.bsdf.choose(path.rng);
-    path.specular = choice.specular.has_value();
+    // Light samples find what lies straight behind glass: the path is still that of its last point.
+    path.straight = choice.specular && (choice.specular->flags & kStraight) != 0;
+    if (last && !path.straight) return false;
+    const uint32_t depth = path.depth;
+    if (path.straight) {
+      path.travelled += at.t;
+    } else {
+      ++path.depth;
+      path.specular = choice.specular.has_value(), path.travelled = 0.0f;
+    }
     if (choice.specular) {
       path.origin = at.bsdf.origin(choice.specular->flags), path.direction = choice.specular->direction;
       path.weight = path.weight * choice.specular->weight / choice.probability;

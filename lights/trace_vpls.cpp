@@ -12,12 +12,14 @@ namespace lumicut {
 namespace {
 
 constexpr size_t kPathsPerChunk = 1024;
+constexpr uint32_t kMostStraight = 64;  // passages of one path straight through glass, which count as no surface
 
 struct LightPath {
   Vec3f origin, direction;
   Rgb flux{};
   uint32_t group = 0;
   Rng rng;
+  uint32_t met = 0;  // surfaces
 };
 
 // A VPL with the light path it came from, to keep the order of paths whatever the order of work.
@@ -40,7 +42,7 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
     ids.push_back(i);
   }
   std::vector<RayHit> rays;
-  for (uint32_t depth = 0; depth < options.max_depth && !paths.empty(); ++depth) {
+  for (uint32_t step = 0; step < options.max_depth + kMostStraight && !paths.empty(); ++step) {
     rays.assign(paths.size(), {});
     for (size_t i = 0; i < paths.size(); ++i) rays[i].ray.org = paths[i].origin, rays[i].ray.dir = paths[i].direction;
     scene.accel().intersect(rays);
@@ -59,6 +61,7 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
       if (max_component(light.intensity) > 0.0f && is_finite(light.intensity)) vpls.push_back({ids[i], light});
       const auto next = at.bsdf.scatter(path.rng);
       if (!next) continue;
+      if ((next->flags & kStraight) == 0 && ++path.met >= options.max_depth) continue;
       path.origin = at.bsdf.origin(next->flags), path.direction = next->direction;
       path.flux = path.flux * next->weight * next->factor;
       if (!(max_component(path.flux) > 0.0f) || !is_finite(path.flux)) continue;

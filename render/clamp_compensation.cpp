@@ -1,16 +1,29 @@
 #include "render/clamp_compensation.h"
 
+#include <utility>
+
 #include "bsdf/point_bsdf.h"
 #include "scene/rng_at_point.h"
 
 namespace lumicut {
 
+constexpr uint32_t kMostStraight = 64;  // passages of one ray straight through glass
+
 struct ClampCompensation::Search {
+  // What a ray carries from the point that it left; the ray itself may have come straight through glass.
+  struct Carried {
+    Rgb weight{};
+    uint32_t pixel = 0;
+    Rng rng;
+    float pdf = 0.0f;
+    Vec3f from{};
+    float travelled = 0.0f;  // from there to the ray's origin
+    uint32_t passages = 0;
+  };
   std::vector<RayHit> rays;
-  std::vector<Rgb> weights;
-  std::vector<uint32_t> pixels;
-  std::vector<Rng> rngs;
-  std::vector<float> pdfs;
+  std::vector<Carried> carried;
+  std::vector<RayHit> next_rays;  // straight on
+  std::vector<Carried> next_carried;
   std::vector<ChainRay> chains;
   mutable BallQueryTree::Scratch scratch;
 };
@@ -26,31 +39,42 @@ float ClampCompensation::lost_at(const Search& search, const Vec3f& position, fl
 
 void ClampCompensation::find_lights(const Search& search, size_t ray, TracedPoints& hits) const {
   const RayHit& r = search.rays[ray];
+  const Search::Carried& c = search.carried[ray];
   light_surfaces_.for_each_hit(r.ray.org, r.ray.dir, r.ray.tfar, [&](const LightSurfaces::Hit& seen) {
-    const float share = nearby_ != nullptr ? nearby_->light_share(r.ray.org, seen.light, seen.t, search.pdfs[ray])
-                                           : lost_at(search, r.ray.org + r.ray.dir * seen.t, seen.t);
-    if (share > 0.0f)
-      hits.add(search.weights[ray] * seen.radiance * share, search.pixels[ray], scene_.lights()[seen.light].group);
+    const float distance = c.travelled + seen.t;
+    const float share = nearby_ != nullptr ? nearby_->light_share(c.from, seen.light, distance, c.pdf)
+                                           : lost_at(search, r.ray.org + r.ray.dir * seen.t, distance);
+    if (share > 0.0f) hits.add(c.weight * seen.radiance * share, c.pixel, scene_.lights()[seen.light].group);
   });
 }
 
 void ClampCompensation::find_surface(Search& search, size_t ray, TracedPoints& hits) const {
   const RayHit& r = search.rays[ray];
-  const SurfaceInteraction at = scene_.interaction(r, search.pixels[ray]);
+  Search::Carried& c = search.carried[ray];
+  const SurfaceInteraction at = scene_.interaction(r, c.pixel);
   // A ray that meets its own surface at once left it below the horizon of the triangle.
-  if (at.t < 4.0f * at.offset) return;
-  const Rgb& weight = search.weights[ray];
+  if (c.passages == 0 && at.t < 4.0f * at.offset) return;
+  const Rgb& weight = c.weight;
+  const float distance = c.travelled + at.t;
   if (max_component(at.emitted) > 0.0f) {
-    const float share = nearby_ != nullptr ? nearby_->triangle_share(r.ray.org, r, search.pdfs[ray])
-                                           : lost_at(search, at.position, at.t);
-    if (share > 0.0f) hits.add(at.emitted * weight * share, search.pixels[ray], scene_.meshes()[at.mesh].group);
+    const float share = nearby_ != nullptr ? nearby_->triangle_share(c.from, r.hit, distance, c.pdf)
+                                           : lost_at(search, at.position, distance);
+    if (share > 0.0f) hits.add(at.emitted * weight * share, c.pixel, scene_.meshes()[at.mesh].group);
   }
-  // Mirrors and glass show it what is behind them: no virtual light shines by way of those.
-  Rng& rng = search.rngs[ray];
-  if (auto next = start_chain(at.bsdf, weight, search.pixels[ray], rng)) search.chains.push_back(*next);
+  // Mirrors and glass show it what is behind them: no virtual light shines by way of those, except straight on.
+  if (auto next = start_chain(at.bsdf, weight, c.pixel, c.rng, c.passages, Passage::straight)) {
+    if (!next->straight) {
+      search.chains.push_back(*next);
+    } else if (c.passages < kMostStraight) {
+      RayHit& on = search.next_rays.emplace_back();
+      on.ray.org = next->origin, on.ray.dir = next->direction;
+      search.next_carried.push_back({next->throughput, c.pixel, next->rng, c.pdf, c.from, distance, c.passages + 1});
+    }
+  }
   if (at.bsdf.layers().empty()) return;
+  Rng& rng = c.rng;
   // Spheres stand for all that is reflected evenly.
-  const float lost = spheres_ ? 0.0f : lost_at(search, at.position, at.t);
+  const float lost = spheres_ ? 0.0f : lost_at(search, at.position, distance);
   for (SurfacePoint point : at.bsdf.layers()) {
     point.diffuse = point.diffuse * lost;
     // Chance decides by what the surface still shows, so that few points cost a whole sum of lights.
@@ -73,15 +97,18 @@ void ClampCompensation::trace(const ShadePoints& points, uint32_t level, const P
     if (!s || !is_finite(s->weight)) continue;
     RayHit ray;
     ray.ray.org = point.position, ray.ray.dir = s->direction;
-    search.rays.push_back(ray), search.weights.push_back(s->weight), search.pixels.push_back(point.pixel);
-    search.rngs.push_back(rng), search.pdfs.push_back(s->pdf);
+    search.rays.push_back(ray);
+    search.carried.push_back({s->weight, point.pixel, rng, s->pdf, point.position});
   }
-  trace_in_parts(std::span(search.rays), progress, [&](std::span<RayHit> part) { scene_.accel().intersect(part); });
-  counters.rays += search.rays.size();
-  for (size_t i = 0; i < search.rays.size(); ++i) {
-    if (i % 4096 == 0) progress.check();
-    if (!light_surfaces_.empty()) find_lights(search, i, hits);
-    if (search.rays[i].hit.geom != kNoId) find_surface(search, i, hits);
+  while (!search.rays.empty()) {
+    trace_in_parts(std::span(search.rays), progress, [&](std::span<RayHit> part) { scene_.accel().intersect(part); });
+    counters.rays += search.rays.size();
+    for (size_t i = 0; i < search.rays.size(); ++i) {
+      if (i % 4096 == 0) progress.check();
+      if (!light_surfaces_.empty()) find_lights(search, i, hits);
+      if (search.rays[i].hit.geom != kNoId) find_surface(search, i, hits);
+    }
+    search.rays = std::exchange(search.next_rays, {}), search.carried = std::exchange(search.next_carried, {});
   }
   follow_chains(scene_, light_surfaces_, std::move(search.chains), progress, hits, counters);
 }

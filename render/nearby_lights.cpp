@@ -72,9 +72,8 @@ float NearbyLights::light_share(const Vec3f& origin, uint32_t light, float dista
   return f.lost > 0.0f ? f.lost * power_heuristic(pdf, kSamples * f.density) : 0.0f;
 }
 
-float NearbyLights::triangle_share(const Vec3f& origin, const RayHit& hit, float pdf) const {
-  const NearLights::Found f =
-      near_.find_triangle(origin, hit.hit.geom, hit.hit.prim, scene_.instance_of(hit.hit), hit.ray.tfar);
+float NearbyLights::triangle_share(const Vec3f& origin, const Hit& hit, float distance, float pdf) const {
+  const NearLights::Found f = near_.find_triangle(origin, hit.geom, hit.prim, scene_.instance_of(hit), distance);
   return f.lost > 0.0f ? f.lost * power_heuristic(pdf, kSamples * f.density) : 0.0f;
 }
 

@@ -26,10 +26,10 @@ class NearbyLights {
   void trace(const ShadePoints& points, const Options& options, const Progress& progress, TracedPoints& hits,
              Counters& counters) const;
 
-  // Of a ray from `origin` by a reflectance of density `pdf` that finds a rectangle or disk, or a triangle: the share of
-  // what it finds that counts, the rest being that of virtual lights and samples.
+  // Of a ray from `origin` by a reflectance of density `pdf` that finds a rectangle or disk, or a triangle, at `distance`:
+  // the share of what it finds that counts, the rest being that of virtual lights and samples.
   float light_share(const Vec3f& origin, uint32_t light, float distance, float pdf) const;
-  float triangle_share(const Vec3f& origin, const RayHit& hit, float pdf) const;
+  float triangle_share(const Vec3f& origin, const Hit& hit, float distance, float pdf) const;
 
  private:
   struct Waiting;

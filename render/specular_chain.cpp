@@ -8,16 +8,17 @@ constexpr uint32_t kSureBounces = 4;
 constexpr float kSureWeight = 0.25f;  // a smooth coat shows less, and would double the points to shade
 }  // namespace
 
-std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uint32_t pixel, Rng rng,
-                                    uint32_t bounces) {
+std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uint32_t pixel, Rng rng, uint32_t bounces,
+                                    Passage passage) {
   const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float(), luck = rng.next_float();
-  const auto s = bsdf.sample_specular(choice, u, v);
+  const auto s = bsdf.sample_specular(choice, u, v, passage);
   if (!s) return {};
   const Rgb weight = throughput * s->weight;
   const float carried = max_component(weight);
   const float survive = bounces < kSureBounces && carried >= kSureWeight ? 1.0f : std::min(1.0f, carried);
   if (!(luck < survive)) return {};
-  return ChainRay{bsdf.origin(s->flags), s->direction, weight / survive, pixel, rng, bounces + 1};
+  return ChainRay{bsdf.origin(s->flags), s->direction, weight / survive,           pixel, rng,
+                  bounces + 1,           passage,      (s->flags & kStraight) != 0};
 }
 
 void follow_chains(const Scene& scene, const LightSurfaces& light_surfaces, std::vector<ChainRay> chains,
@@ -50,7 +51,7 @@ void follow_chains(const Scene& scene, const LightSurfaces& light_surfaces, std:
         point.attenuate(chain.throughput);
         if (!PointBsdf(point).black()) hits.found.push_back(point);
       }
-      if (auto ray = start_chain(at.bsdf, chain.throughput, chain.pixel, chain.rng, chain.bounces))
+      if (auto ray = start_chain(at.bsdf, chain.throughput, chain.pixel, chain.rng, chain.bounces, chain.passage))
         next.push_back(*ray);
     }
     chains = std::move(next);

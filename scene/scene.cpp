@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "accel/validate.h"
+#include "bsdf/straight_glass.h"
 #include "core/error.h"
 #include "core/rng.h"
 
@@ -72,6 +73,24 @@ void check_mesh(const Mesh& mesh) {
 void mend_normals(std::vector<Vec3f>& normals) {
   for (Vec3f& n : normals)
     if (!is_finite(n)) n = {};
+}
+
+// 0 without coordinates.
+Vec2f uv_at(const Mesh& mesh, uint32_t prim, float u, float v) {
+  if (mesh.uvs.empty()) return {};
+  const uint32_t* t = &mesh.indices[3 * size_t{prim}];
+  const Vec2f a = mesh.uvs[t[0]], b = mesh.uvs[t[1]], c = mesh.uvs[t[2]];
+  return {a.x + u * (b.x - a.x) + v * (c.x - a.x), a.y + u * (b.y - a.y) + v * (c.y - a.y)};
+}
+
+// Chance by the place, so that a ray fares the same whenever it is traced; on a grid, so that last bits of u and v,
+// which differ between ways to trace, do not matter.
+bool passes_by_chance(float stops, uint32_t mesh, uint32_t prim, float u, float v) {
+  constexpr float kLeast = 1.0f / 256.0f, kCells = 1 << 20;
+  if (stops < kLeast || stops > 1.0f - kLeast) return stops < kLeast;
+  const auto cell = [](float x) { return static_cast<uint64_t>(std::clamp(x, 0.0f, 1.0f) * kCells); };
+  const uint64_t place = hash64(hash64(mesh, prim), cell(u) << 32 | cell(v));
+  return static_cast<float>(place >> 40) * 0x1p-24f >= stops;
 }
 
 }  // namespace
@@ -208,10 +227,14 @@ void Scene::commit(Progress& progress) {
   std::vector<Aabb> boxes;
   for (uint32_t m = 0; m < meshes_.size(); ++m) {
     const Mesh& mesh = meshes_[m];
-    bool cutout = mesh.triangle_materials.empty() && mesh.triangle_count() > 0 && materials_[mesh.material].cutout();
-    for (uint32_t material : mesh.triangle_materials) cutout = cutout || materials_[material].cutout();
-    geometry.meshes.push_back(
-        {mesh.positions.data(), mesh.positions.size(), mesh.indices.data(), mesh.triangle_count(), mesh.mask, cutout});
+    bool cutout = false, passes_light = false;
+    const auto meet = [&](const Material& material) {
+      cutout = cutout || material.cutout(), passes_light = passes_light || material.shadows_pass;
+    };
+    if (mesh.triangle_materials.empty() && mesh.triangle_count() > 0) meet(materials_[mesh.material]);
+    for (uint32_t material : mesh.triangle_materials) meet(materials_[material]);
+    geometry.meshes.push_back({mesh.positions.data(), mesh.positions.size(), mesh.indices.data(), mesh.triangle_count(),
+                               mesh.mask, cutout, passes_light});
     first_instance.push_back(static_cast<uint32_t>(geometry.instances.size()));
     for (uint32_t i = 0; i < instance_count(m); ++i) {
       const Transform& t = instance(m, i);
@@ -251,15 +274,27 @@ const Transform& Scene::instance(uint32_t mesh, uint32_t index) const {
   return meshes_[mesh].instances.empty() ? identity : meshes_[mesh].instances[index];
 }
 
-// Chance by the place, so that a ray fares the same whenever it is traced; on a grid, so that last bits of u and v,
-// which differ between ways to trace, do not matter.
-bool Scene::passes(uint32_t mesh_id, uint32_t prim, float u, float v) const {
-  constexpr float kLeast = 1.0f / 256.0f, kCells = 1 << 20;
-  const float stops = opacity(mesh_id, prim, u, v);
-  if (stops < kLeast || stops > 1.0f - kLeast) return stops < kLeast;
-  const auto cell = [](float x) { return static_cast<uint64_t>(std::clamp(x, 0.0f, 1.0f) * kCells); };
-  const uint64_t place = hash64(hash64(mesh_id, prim), cell(u) << 32 | cell(v));
-  return static_cast<float>(place >> 40) * 0x1p-24f >= stops;
+bool Scene::passes(uint32_t mesh, uint32_t prim, float u, float v) const {
+  return passes_by_chance(opacity(mesh, prim, u, v), mesh, prim, u, v);
+}
+
+// Visibility is a yes or no, so that the chance is the luminance of what passes.
+bool Scene::passes_light(const LightHit& hit) const {
+  const Mesh& mesh = meshes_[hit.mesh];
+  const uint32_t id = mesh.material_of(hit.prim);
+  float stops = opacity(hit.mesh, hit.prim, hit.u, hit.v);
+  if (stops > 0.0f && materials_[id].shadows_pass) {
+    const uint32_t* t = &mesh.indices[3 * size_t{hit.prim}];
+    const Vec3f& corner = mesh.positions[t[0]];
+    Vec3f edges[2] = {mesh.positions[t[1]] - corner, mesh.positions[t[2]] - corner}, dir = hit.dir;
+    if (hit.inst != kNoId) {
+      const Transform& to_world = instance(hit.mesh, hit.inst - first_instance_[hit.mesh]);
+      edges[0] = to_world.vector(edges[0]), edges[1] = to_world.vector(edges[1]), dir = to_world.vector(dir);
+    }
+    const float cosine = dot(normalize(cross(edges[0], edges[1])), normalize(dir));
+    stops *= 1.0f - luminance(straight_transmittance(bsdf_parameters(id, uv_at(mesh, hit.prim, hit.u, hit.v)), cosine));
+  }
+  return passes_by_chance(stops, hit.mesh, hit.prim, hit.u, hit.v);
 }
 
 float Scene::opacity(uint32_t mesh_id, uint32_t prim, float u, float v) const {
@@ -267,10 +302,8 @@ float Scene::opacity(uint32_t mesh_id, uint32_t prim, float u, float v) const {
   const Material& material = materials_[mesh.material_of(prim)];
   float opacity = material.opacity;
   if (material.opacity_texture >= 0 && !mesh.uvs.empty()) {
-    const uint32_t* t = &mesh.indices[3 * size_t{prim}];
-    const Vec2f a = mesh.uvs[t[0]], b = mesh.uvs[t[1]], c = mesh.uvs[t[2]];
-    opacity *= textures_[material.opacity_texture].mask(a.x + u * (b.x - a.x) + v * (c.x - a.x),
-                                                        a.y + u * (b.y - a.y) + v * (c.y - a.y));
+    const Vec2f at = uv_at(mesh, prim, u, v);
+    opacity *= textures_[material.opacity_texture].mask(at.x, at.y);
   }
   return opacity;
 }
@@ -403,6 +436,7 @@ BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv, const Surface
   p.ior = m.ior, p.transmission = m.transmission;
   p.coat = m.coat, p.coat_alpha = m.coat_alpha(), p.coat_ior = m.coat_ior;
   p.glass = glass_[material].get();
+  p.shadows_pass = m.shadows_pass;
   return p;
 }
 

@@ -154,6 +154,7 @@ class Scene final : private HitFilter {
   Vec3f bumped_normal(const Material& material, const Vec3f& normal, Vec2f uv, const Vec3f& along_u,
                       const Vec3f& along_v) const;
   bool passes(uint32_t mesh, uint32_t prim, float u, float v) const override;
+  bool passes_light(const LightHit& hit) const override;
   void check_references() const;
 
   Config config_;

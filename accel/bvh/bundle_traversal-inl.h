@@ -25,7 +25,8 @@ constexpr int kFewRays = 3;
 template <class C, bool kDirectional>
 class BundleTracer {
  public:
-  HWY_INLINE BundleTracer(const TraceScene& scene, const Bundle& bundle) : scene_(scene), bundle_(bundle) {
+  HWY_INLINE BundleTracer(const TraceScene& scene, uint32_t instance_id, const Bundle& bundle)
+      : scene_(scene), instance_id_(instance_id), bundle_(bundle) {
     for (int axis = 0; axis < 3; ++axis) {
       const float* values = kDirectional ? bundle_.origin[axis] : bundle_.rcp_dir[axis];
       const auto [lo, hi] = interval(values);
@@ -65,7 +66,7 @@ class BundleTracer {
       if (__builtin_popcountll(rays) <= kFewRays) {
         for (uint64_t m = rays; m != 0; m &= m - 1) {
           const int i = __builtin_ctzll(m);
-          if (any_hit<C>(scene_, bvh, next.child, ray(i))) open &= ~(uint64_t{1} << i);
+          if (any_hit<C>(scene_, bvh, instance_id_, next.child, ray(i))) open &= ~(uint64_t{1} << i);
         }
         if (open == 0) break;
         continue;
@@ -210,7 +211,7 @@ class BundleTracer {
     HitLanes hits;
     const uint32_t hit = intersect_block<C, C::kFilters>(scene_, block, LaneRay(r.org, r.dir), hn::Zero(d4),
                                                          hn::Set(d4, r.tfar), r.mask, hits);
-    return any_lane_stops<C>(scene_, block, hit, hits);
+    return any_lane_stops<C>(scene_, block, instance_id_, r.dir, hit, hits);
   }
 
   // Traces the bundle in the space of an instance, where it has a common origin or direction again.
@@ -231,10 +232,11 @@ class BundleTracer {
       }
     }
     using Inner = SceneConfig<C::kRobust, C::kBoxes, C::kMasks, C::kFilters, false>;
-    return BundleTracer<Inner, kDirectional>(scene_, local).run(*in.bvh);
+    return BundleTracer<Inner, kDirectional>(scene_, index, local).run(*in.bvh);
   }
 
   const TraceScene& scene_;
+  const uint32_t instance_id_;
   const Bundle& bundle_;
   float lo_[3], hi_[3];                      // over the active rays: 1/dir; kDirectional: origin
   float common_rcp_[3];                      // kDirectional: 1/direction
@@ -285,7 +287,8 @@ HWY_NOINLINE void trace_points_in_bundles(const TraceScene& scene, const Vec3f& 
       }
       bundle.active |= static_cast<uint64_t>(bits_of(d, valid)) << i;
     }
-    const uint64_t stopped = bundle.active == 0 ? 0 : BundleTracer<C, kDirectional>(scene, bundle).run(*scene.top);
+    const uint64_t stopped =
+        bundle.active == 0 ? 0 : BundleTracer<C, kDirectional>(scene, kNoId, bundle).run(*scene.top);
     for (size_t i = 0; i < count; ++i) occluded[begin + i] = static_cast<uint8_t>((stopped >> i) & 1);
   }
 }

@@ -17,10 +17,11 @@ HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 namespace {  // one includer, traverse.cpp: functions with one caller are inlined
 
-// True when something lies in (r.tnear, r.tfar) below child word `start`. Children are visited in the order stored by
-// collapse().
+// True when something that stops light lies in (r.tnear, r.tfar) below child word `start`. Children are visited in the
+// order stored by collapse().
 template <class C>
-HWY_NOINLINE bool any_hit(const TraceScene& scene, const WideBvh& bvh, uint32_t start, const Ray& r) {
+HWY_NOINLINE bool any_hit(const TraceScene& scene, const WideBvh& bvh, uint32_t instance_id, uint32_t start,
+                          const Ray& r) {
   const D8 d8;
   const D4 d4;
   const Slabs<C::kRobust> slabs(r.org, r.dir);
@@ -50,16 +51,17 @@ HWY_NOINLINE bool any_hit(const TraceScene& scene, const WideBvh& bvh, uint32_t 
       if constexpr (!C::kInstances) prefetch(bvh, current);
     }
     if constexpr (C::kInstances) {
-      const TraceScene::Instance& instance = scene.instances[current & ~kLeafBit];
+      const uint32_t id = current & ~kLeafBit;
+      const TraceScene::Instance& instance = scene.instances[id];
       Ray local = r;
       local.org = local_point(instance, r.org), local.dir = local_vector(instance, r.dir);
       using Inner = SceneConfig<C::kRobust, C::kBoxes, C::kMasks, C::kFilters, false>;
-      if (any_hit<Inner>(scene, *instance.bvh, instance.bvh->root, local)) return true;
+      if (any_hit<Inner>(scene, *instance.bvh, id, instance.bvh->root, local)) return true;
     } else {
       const LeafBlock& block = bvh.leaves[current & ~kLeafBit];
       HitLanes hits;
       const uint32_t hit = intersect_block<C, C::kFilters>(scene, block, lanes, tnear4, tfar4, r.mask, hits);
-      if (any_lane_stops<C>(scene, block, hit, hits)) return true;
+      if (any_lane_stops<C>(scene, block, instance_id, r.dir, hit, hits)) return true;
     }
     if (top == 0) return false;
     current = stack[--top];
@@ -144,7 +146,7 @@ HWY_NOINLINE void closest_hit(const TraceScene& scene, const WideBvh& bvh, uint3
             // A first hit may equal tfar where the division rounded up.
             if (!(t[lane] < r.ray.tfar) && !(t[lane] == r.ray.tfar && !nearer && r.hit.geom == kNoId)) continue;
             if constexpr (C::kFilters)
-              if (scene.has_cutout[block.geom[lane]] != 0 &&
+              if ((scene.filtered[block.geom[lane]] & kFilterAll) != 0 &&
                   scene.filter->passes(block.geom[lane], block.prim[lane], u[lane], v[lane]))
                 continue;
             nearer = true;

@@ -30,7 +30,7 @@ void trace_any_singly(const TraceScene& scene, Ray* rays, size_t n) {
     Ray r = rays[i];
     if (!is_traceable(r, scene.limits) || r.mask == 0) continue;
     r.tnear = std::max(r.tnear, 0.0f);
-    if (any_hit<C>(scene, *scene.top, scene.top->root, r)) rays[i].tfar = -kInf;
+    if (any_hit<C>(scene, *scene.top, kNoId, scene.top->root, r)) rays[i].tfar = -kInf;
   }
 }
 

@@ -10,6 +10,9 @@
 
 namespace lumicut {
 
+// Which rays the filter is asked for at a mesh.
+enum FilteredRays : uint8_t { kFilterAll = 1, kFilterLight = 2 };
+
 // Input of traversal. Features that a scene does not use are compiled out of its loops.
 struct TraceScene {
   struct Instance {
@@ -19,7 +22,7 @@ struct TraceScene {
   const WideBvh* top = nullptr;  // over primitives, or over instances
   std::span<const Instance> instances;
   const HitFilter* filter = nullptr;
-  const uint8_t* has_cutout = nullptr;   // by mesh
+  const uint8_t* filtered = nullptr;     // by mesh: FilteredRays
   const uint32_t* mesh_masks = nullptr;  // by mesh
   bool robust = true;
   bool boxes = false;  // leaves hold boxes, not triangles

@@ -55,7 +55,56 @@ std::pair<double, double> energy(const Material& m, const Vec3f& to_viewer) {
   return {reflected, transmitted};
 }
 
+Material window(float roughness, const Rgb& base = {1, 1, 1}) {
+  Material m = glass(roughness, 1.5f, base);
+  m.shadows_pass = true;
+  return m;
+}
+
 }  // namespace
+
+// Light paths and what follows the first surface that is seen; the camera's rays are bent as ever.
+TEST(SpecularLobes, LightGoesStraightThroughGlassWhoseShadowsPass) {
+  const OneSurface clear(window(0, {0.81f, 0.64f, 0.25f})), bends(glass(0, 1.5f, {0.81f, 0.64f, 0.25f}));
+  for (const float side : {1.0f, -1.0f}) {
+    const Vec3f view = at(0.6f) * side;
+    const auto straight = clear.bsdf(view).sample_specular(0.9f, 0.3f, 0.6f, Passage::straight);
+    ASSERT_TRUE(straight);
+    EXPECT_EQ(straight->flags, kSpecular | kTransmitted | kStraight);
+    EXPECT_EQ(straight->direction, -view);
+    const auto camera = clear.follow(view, 0.9f), before = bends.follow(view, 0.9f);
+    ASSERT_EQ(camera.has_value(), before.has_value());
+    if (camera) EXPECT_EQ(camera->direction, before->direction);
+    // By chance of what passes: the mean has the colour once, and no factor of refraction.
+    Rng rng(7, Stage::test);
+    Rgb carried{};
+    constexpr int kSamples = 100000;
+    for (int i = 0; i < kSamples; ++i)
+      if (const auto s = clear.bsdf(view).scatter(rng); s && (s->flags & kStraight) != 0)
+        carried += s->weight * (s->factor / kSamples);
+    float refracted = 0;
+    const float passed = 1 - fresnel_reflectance(0.6f, 1.5f, refracted);
+    EXPECT_NEAR(carried.x, passed * 0.9f, 0.005);
+    EXPECT_NEAR(carried.y, passed * 0.8f, 0.005);
+    EXPECT_NEAR(carried.z, passed * 0.5f, 0.005);
+  }
+}
+
+TEST(SpecularLobes, WhiteGlassWhoseShadowsPassKeepsAllLightFromEitherSide) {
+  for (const float roughness : {0.0f, 0.15f, 0.5f, 1.0f})
+    for (const float cosine : {1.0f, 0.7f, 0.4f, 0.15f, -0.15f, -0.4f, -1.0f}) {
+      const OneSurface surface(window(roughness));
+      const Bsdf bsdf = surface.bsdf(at(cosine));
+      Rng rng(8, Stage::test);
+      double all = 0;
+      constexpr int kSamples = 20000;
+      for (int i = 0; i < kSamples; ++i) {
+        const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float();
+        if (const auto s = bsdf.sample_specular(choice, u, v, Passage::straight)) all += s->weight.y / kSamples;
+      }
+      EXPECT_NEAR(all, 1, 0.025) << roughness << " " << cosine;  // of the table, and noise
+    }
+}
 
 TEST(SpecularLobes, AMirrorReflectsExactly) {
   Material m = ggx({0.9f, 0.6f, 0.3f}, 0);

@@ -7,7 +7,20 @@
 namespace lumicut {
 namespace {
 
-enum class Glass { none, sheet_out, sheet_in, slab, ball, paper };
+enum class Glass {
+  none,
+  sheet_out,
+  sheet_in,
+  slab,
+  ball,
+  paper,
+  // Light passes straight.
+  straight_sheet,
+  straight_slab,
+  straight_ball,
+  straight_rough,
+  straight_lamp,
+};
 
 void add_ball(Mesh& mesh, const Vec3f& center, float radius, uint32_t material) {
   constexpr int kRings = 12, kSegments = 24;
@@ -28,6 +41,17 @@ std::unique_ptr<Scene> make_glass(Glass kind) {
   glass.lobe = LobeModel::ggx, glass.specular = {1, 1, 1}, glass.roughness = 0, glass.transmission = 1;
   Material glowing = test::diffuse(0, 0, 0);
   glowing.emission = {2, 2, 2};
+  if (kind >= Glass::straight_sheet) glass.shadows_pass = true;
+  if (kind == Glass::straight_sheet) glass.diffuse = {0.8f, 0.7f, 0.9f};
+  if (kind == Glass::straight_rough) glass.roughness = 0.4f;
+  if (kind == Glass::straight_lamp) {
+    // Close to the pane, so that the clamp takes much of what passes, and in the half of the camera a mesh of its own.
+    glowing.emission = {};
+    Light lamp;
+    lamp.type = LightType::rectangle, lamp.position = {0, 0.15f, 0}, lamp.value = {4, 4, 4};
+    lamp.u = {0.6f, 0, 0}, lamp.v = {0, 0, 0.6f};  // shines to −y, through the pane
+    scene->set_lights({lamp});
+  }
   scene->set_materials({test::diffuse(0.6f, 0.6f, 0.6f), glass, glowing});
   Mesh mesh;
   test::add_box(mesh, {-1, -1, -1}, {1, 1, 1}, 0, true);
@@ -39,15 +63,20 @@ std::unique_ptr<Scene> make_glass(Glass kind) {
       glass = test::diffuse(0.3f, 0.3f, 0.3f), glass.translucency = {0.5f, 0.4f, 0.6f};
       scene->set_materials({test::diffuse(0.6f, 0.6f, 0.6f), glass, glowing});
       [[fallthrough]];
+    case Glass::straight_sheet:
+    case Glass::straight_rough:
+    case Glass::straight_lamp:
     case Glass::sheet_out:
       test::add_quad(mesh, {-1, 0, -1}, {1, 0, -1}, {1, 0, 1}, {-1, 0, 1}, 1);
       break;
     case Glass::sheet_in:
       test::add_quad(mesh, {-1, 0, 1}, {1, 0, 1}, {1, 0, -1}, {-1, 0, -1}, 1);
       break;
+    case Glass::straight_slab:
     case Glass::slab:
       test::add_box(mesh, {-1.1f, 0, -1.1f}, {1.1f, 0.1f, 1.1f}, 1, false);
       break;
+    case Glass::straight_ball:
     case Glass::ball:
       add_ball(mesh, {0, 0.1f, 0}, 0.6f, 1);
   }
@@ -96,7 +125,8 @@ double mean_of(const std::vector<Rgb>& pixels) {
 class OfGlass : public testing::TestWithParam<Glass> {};
 INSTANTIATE_TEST_SUITE_P(Kinds, OfGlass,
                          testing::Values(Glass::none, Glass::sheet_out, Glass::sheet_in, Glass::slab, Glass::ball,
-                                         Glass::paper));
+                                         Glass::paper, Glass::straight_sheet, Glass::straight_slab,
+                                         Glass::straight_ball, Glass::straight_rough, Glass::straight_lamp));
 
 TEST_P(OfGlass, CompensatedIterationsGiveThePathTracersImage) {
   const auto scene = make_glass(GetParam());
@@ -116,6 +146,16 @@ TEST_P(OfGlass, CompensatedIterationsGiveThePathTracersImage) {
   RecordProperty("ratio", std::to_string(mean / truth) + " +- " + std::to_string(deviation / truth));
   // Sanitized: four iterations tell little of their own deviation, and the truth has a noise of 1 %.
   EXPECT_NEAR(mean / truth, 1.0, test::kSanitized ? 0.08 : 0.01 + 3 * deviation / truth);
+}
+
+// What a slab of parallel borders bends, it bends back; light is shifted by a little alone.
+TEST(StraightGlass, OfASlabLetsThroughAsMuchAsOneThatBends) {
+  const auto mean = [](Glass kind) {
+    return mean_of(test::render(*make_glass(kind), "path_tracer", {}, {{"samples", "4"}},
+                                {.width = 24, .height = 18, .samples = test::kSanitized ? 100 : 1024})
+                       .radiance);
+  };
+  EXPECT_NEAR(mean(Glass::straight_slab) / mean(Glass::slab), 1.0, test::kSanitized ? 0.06 : 0.03);
 }
 
 }  // namespace

@@ -1,0 +1,29 @@
+// Glass that light passes straight: what a material's `shadows_pass` makes of it for shadow rays and for the rays that
+// carry light. docs/decisions/0019-shadows-through-glass.md
+#pragma once
+
+#include <cmath>
+
+#include "bsdf/coat.h"
+
+namespace lumicut {
+
+inline constexpr float kSmoothAlpha = 1e-4f;  // facets below turn directions by less than single precision tells
+
+// Share that goes straight on through one border, for the cosine to the geometric normal. Either side counts as the outer
+// one: in a slab light that was not bent meets the second border as it met the first, and is not totally reflected there.
+inline Rgb straight_transmittance(const BsdfParameters& m, float cosine) {
+  const float clear = m.fresnel ? (1.0f - m.metallic) * m.transmission : 0.0f;
+  if (!(clear > 0.0f)) return {};
+  cosine = std::min(1.0f, std::abs(cosine));
+  const bool rough = !(m.alpha < kSmoothAlpha) && m.glass != nullptr;
+  float refracted = 0.0f;
+  float share =
+      clear * (rough ? m.glass->passed(m.alpha, cosine) : 1.0f - fresnel_reflectance(cosine, m.ior, refracted));
+  if (m.coat > 0.0f && !m.additive) share *= clear_coat(m, cosine).transmittance.to_viewer;
+  Rgb passed{};
+  for (int k = 0; k < 3; ++k) passed[k] = share * std::sqrt(std::max(0.0f, m.diffuse[k]));
+  return passed;
+}
+
+}  // namespace lumicut
