@@ -282,7 +282,13 @@ class SceneReader {
       if ((m.flags & LUMICUT_BURLEY) != 0 && (m.flags & LUMICUT_NO_FRESNEL) != 0)
         burley->fail("must be false where \"fresnel\" is");
     }
-    if (!ggx) m.flags &= ~uint32_t{LUMICUT_NO_FRESNEL | LUMICUT_BURLEY};
+    const auto shadows = object.find("shadows_pass");
+    if (shadows) {
+      if (!ggx) shadows->fail("is of the model \"ggx\" alone");
+      m.flags =
+          (m.flags & ~uint32_t{LUMICUT_SHADOWS_PASS}) | (shadows->boolean() ? uint32_t{LUMICUT_SHADOWS_PASS} : 0u);
+    }
+    if (!ggx) m.flags &= ~uint32_t{LUMICUT_NO_FRESNEL | LUMICUT_BURLEY | LUMICUT_SHADOWS_PASS};
     if (auto tint = object.find("specular_tint")) {
       if (!ggx) tint->fail("is of the model \"ggx\" alone");
       store(m.specular_tint, tint->vector3(1e-6, 1));
@@ -295,6 +301,10 @@ class SceneReader {
       for (const char* key : {"metallic", "transmission"})
         if (auto given = object.find(key); given && given->number(0, 1) > 0)
           given->fail("must be 0 where \"fresnel\" is false");
+    if ((m.flags & LUMICUT_SHADOWS_PASS) != 0 && !(m.transmission > 0.0f)) {
+      if (shadows) shadows->fail("needs a \"transmission\" above 0");
+      m.flags &= ~uint32_t{LUMICUT_SHADOWS_PASS};  // of the material that this one changes
+    }
     number("ior", m.ior, 0.1, 10, ggx);
     number("coat", m.coat, 0, 1, ggx);
     number("coat_roughness", m.coat_roughness, 0, 1, ggx);

@@ -79,7 +79,8 @@ Texture to_texture(const lumicut_texture& in, uint64_t index) {
 Material to_material(const lumicut_material& in, uint64_t index) {
   const FieldValidator c("lumicut_material", index);
   c.flags("flags", in.flags,
-          LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG | LUMICUT_GGX | LUMICUT_NO_FRESNEL | LUMICUT_BURLEY);
+          LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG | LUMICUT_GGX | LUMICUT_NO_FRESNEL | LUMICUT_BURLEY |
+              LUMICUT_SHADOWS_PASS);
   if ((in.flags & LUMICUT_PHONG) != 0 && (in.flags & LUMICUT_GGX) != 0)
     c.fail("flags", "holds both LUMICUT_PHONG and LUMICUT_GGX");
   if ((in.flags & LUMICUT_NO_FRESNEL) != 0) {
@@ -90,6 +91,10 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   if ((in.flags & LUMICUT_BURLEY) != 0) {
     if ((in.flags & LUMICUT_GGX) == 0) c.fail("flags", "holds LUMICUT_BURLEY without LUMICUT_GGX");
     if ((in.flags & LUMICUT_NO_FRESNEL) != 0) c.fail("flags", "holds both LUMICUT_BURLEY and LUMICUT_NO_FRESNEL");
+  }
+  if ((in.flags & LUMICUT_SHADOWS_PASS) != 0) {
+    if ((in.flags & LUMICUT_GGX) == 0) c.fail("flags", "holds LUMICUT_SHADOWS_PASS without LUMICUT_GGX");
+    if (!(in.transmission > 0.0f)) c.fail("transmission", "must be above 0 with LUMICUT_SHADOWS_PASS");
   }
   // Of a textured colour the product must be a share, not the factor: Scene::bsdf_parameters sees to that.
   constexpr float kLargestFactor = 1e6f;
@@ -114,6 +119,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   if ((in.flags & LUMICUT_GGX) != 0) m.lobe = LobeModel::ggx;
   m.fresnel = (in.flags & LUMICUT_NO_FRESNEL) == 0;
   m.burley = (in.flags & LUMICUT_BURLEY) != 0;
+  m.shadows_pass = (in.flags & LUMICUT_SHADOWS_PASS) != 0;
   c.range("specular_tint", in.specular_tint, 0.0f, 1.0f);
   if (max_component(vec(in.specular_tint)) > 0.0f) m.specular_tint = vec(in.specular_tint);
   m.roughness = in.roughness, m.metallic = in.metallic, m.transmission = in.transmission;

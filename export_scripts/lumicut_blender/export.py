@@ -166,6 +166,8 @@ class Writer:
                 out["fresnel"] = False
             if m.flags & library.BURLEY:
                 out["burley"] = True
+            if m.flags & library.SHADOWS_PASS:
+                out["shadows_pass"] = True
             if any(m.specular_tint):
                 out["specular_tint"] = numbers(m.specular_tint)
             for key in ("roughness", "metallic", "ior", "transmission"):

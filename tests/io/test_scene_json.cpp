@@ -253,6 +253,13 @@ TEST(SceneJson, GgxHasItsOwnParameters) {
   const lumicut_material old = read_scene(folder.write("scene.json", scene.dump())).materials.back().values;
   EXPECT_EQ(old.flags, uint32_t{LUMICUT_GGX | LUMICUT_BURLEY});
   EXPECT_EQ(old.specular_tint[2], 0.7f);
+  scene["materials"].push_back(
+      {{"name", "window"}, {"model", "ggx"}, {"transmission", 1}, {"roughness", 0}, {"shadows_pass", true}});
+  EXPECT_EQ(read_scene(folder.write("scene.json", scene.dump())).materials.back().values.flags,
+            uint32_t{LUMICUT_GGX | LUMICUT_SHADOWS_PASS});
+  expect_in(wrong({{"name", "a"}, {"shadows_pass", true}}), {"shadows_pass", "\"ggx\" alone"});
+  expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"shadows_pass", true}}),
+            {"shadows_pass", "needs a \"transmission\" above 0"});
   expect_in(wrong({{"name", "a"}, {"fresnel", false}}), {"fresnel", "\"ggx\" alone"});
   expect_in(wrong({{"name", "a"}, {"burley", true}}), {"burley", "\"ggx\" alone"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"burley", true}, {"fresnel", false}}),

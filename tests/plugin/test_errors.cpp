@@ -170,6 +170,10 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
       {[](M& m) { m.flags = LUMICUT_NO_FRESNEL; }, "lumicut_material[3].flags: holds LUMICUT_NO_FRESNEL without"},
       {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_NO_FRESNEL, m.metallic = 1; },
        "lumicut_material[3].metallic: must be 0 with"},
+      {[](M& m) { m.flags = LUMICUT_SHADOWS_PASS; },
+       "lumicut_material[3].flags: holds LUMICUT_SHADOWS_PASS without LUMICUT_GGX"},
+      {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_SHADOWS_PASS, m.transmission = 0; },
+       "lumicut_material[3].transmission: must be above 0 with LUMICUT_SHADOWS_PASS"},
       {[](M& m) { m.flags = 64; }, "lumicut_material[3].flags: 64", LUMICUT_UNSUPPORTED},
   };
   for (const auto& w : wrongs) {

@@ -84,6 +84,7 @@ std::vector<Change> scene_changes() {
       material("material.normal_strength", [](M& m) { m.normal_strength = 0.5f; }),
       material("material.translucency_texture", [](M& m) { m.translucency_texture = 1; }),
       material("material.flags (Burley)", [](M& m) { m.flags |= LUMICUT_BURLEY; }),
+      material("material.flags (shadows pass)", [](M& m) { m.flags |= LUMICUT_SHADOWS_PASS, m.transmission = 0.5f; }),
       material("material.specular_tint",
                [](M& m) { m.specular_tint[0] = m.specular_tint[1] = 1, m.specular_tint[2] = 0.5f; }),
       material("material.translucency", [](M& m) { m.translucency[1] = 0.25f; }),

@@ -120,7 +120,10 @@ typedef struct lumicut_material {
      With LUMICUT_NO_FRESNEL specular is the lobe's reflectance at every angle, beside a Lambertian diffuse (which shading
      trees call a mix of diffuse and glossy): diffuse + specular <= 1 keeps energy; no metallic, transmission.
      With LUMICUT_BURLEY the diffuse part is Burley's (2012), and coats add to it without taking from it: Blender's
-     Principled shader before 4.0. It may reflect more than it gets */
+     Principled shader before 4.0. It may reflect more than it gets.
+     With LUMICUT_SHADOWS_PASS, where transmission is above 0, light goes straight through the glass, dimmed by Fresnel's
+     equations and its colour at each border, so that lamps shine through windows; the camera sees it bent as ever.
+     Shadow rays pass by chance, by the luminance of what passes; no caustics of this glass */
   float roughness;         /* 0..1; the distribution's alpha is its square */
   float metallic;          /* 0..1 */
   float ior;               /* 0.1..10; 0: not given, taken as 1.5 */
@@ -142,7 +145,14 @@ typedef struct lumicut_material {
   /* LUMICUT_GGX alone */
   float specular_tint[3];      /* 0..1: of metal at 82 degrees, over its colour there; of what glass reflects; all 0: not given, taken as 1 */
 } lumicut_material;
-enum { LUMICUT_EMIT_BOTH_SIDES = 1, LUMICUT_PHONG = 2, LUMICUT_GGX = 4, LUMICUT_NO_FRESNEL = 8, LUMICUT_BURLEY = 16 };
+enum {
+  LUMICUT_EMIT_BOTH_SIDES = 1,
+  LUMICUT_PHONG = 2,
+  LUMICUT_GGX = 4,
+  LUMICUT_NO_FRESNEL = 8,
+  LUMICUT_BURLEY = 16,
+  LUMICUT_SHADOWS_PASS = 32
+};
 
 typedef struct lumicut_mesh {
   uint32_t struct_size;
