@@ -3,12 +3,14 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 
 #include "bsdf/coat.h"
 
 namespace lumicut {
 
-inline constexpr float kSmoothAlpha = 1e-4f;  // facets below turn directions by less than single precision tells
+inline constexpr uint32_t kMostStraight = 64;  // passages of one path: they count as no surface, and must end
+inline constexpr float kSmoothAlpha = 1e-4f;   // facets below turn directions by less than single precision tells
 
 // Share that goes straight on through one border, for the cosine to the geometric normal. Either side counts as the outer
 // one: in a slab light that was not bent meets the second border as it met the first, and is not totally reflected there.

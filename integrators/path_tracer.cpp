@@ -2,6 +2,7 @@
 // [Kajiya 1986; multiple importance sampling: Veach, Guibas 1995]
 #include <numbers>
 
+#include "bsdf/straight_glass.h"
 #include "clustering/light_kernel.h"
 #include "core/parallel.h"
 #include "core/sampling.h"
@@ -15,9 +16,8 @@ namespace lumicut {
 
 namespace {
 
-constexpr size_t kChunk = 1024;         // points
-constexpr uint32_t kSureBounces = 3;    // before chance may end a path
-constexpr uint32_t kMostStraight = 64;  // passages of one path straight through glass, which count as no surface
+constexpr size_t kChunk = 1024;       // points
+constexpr uint32_t kSureBounces = 3;  // before chance may end a path
 
 struct PathTracerParams {
   uint32_t samples = 16;

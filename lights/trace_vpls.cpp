@@ -3,6 +3,7 @@
 // by the number of VPLs, as some codes do, halves the indirect light of a closed room of albedo ½).
 #include "lights/trace_vpls.h"
 
+#include "bsdf/straight_glass.h"
 #include "lights/light_sampler.h"
 #include "lights/sphere_radii.h"
 #include "scene/scene.h"
@@ -12,7 +13,6 @@ namespace lumicut {
 namespace {
 
 constexpr size_t kPathsPerChunk = 1024;
-constexpr uint32_t kMostStraight = 64;  // passages of one path straight through glass, which count as no surface
 
 struct LightPath {
   Vec3f origin, direction;

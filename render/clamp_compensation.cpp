@@ -3,11 +3,10 @@
 #include <utility>
 
 #include "bsdf/point_bsdf.h"
+#include "bsdf/straight_glass.h"
 #include "scene/rng_at_point.h"
 
 namespace lumicut {
-
-constexpr uint32_t kMostStraight = 64;  // passages of one ray straight through glass
 
 struct ClampCompensation::Search {
   // What a ray carries from the point that it left; the ray itself may have come straight through glass.

@@ -74,7 +74,9 @@ TEST(SpecularLobes, LightGoesStraightThroughGlassWhoseShadowsPass) {
     EXPECT_EQ(straight->direction, -view);
     const auto camera = clear.follow(view, 0.9f), before = bends.follow(view, 0.9f);
     ASSERT_EQ(camera.has_value(), before.has_value());
-    if (camera) EXPECT_EQ(camera->direction, before->direction);
+    if (camera) {
+      EXPECT_EQ(camera->direction, before->direction);
+    }
     // By chance of what passes: the mean has the colour once, and no factor of refraction.
     Rng rng(7, Stage::test);
     Rgb carried{};
