@@ -196,6 +196,7 @@ class Collector:
         self.profiles = lights.Profiles(self.report)
         self._meshes, self._flat = {}, []  # by what they are made from; those of flat instances
         self._looked_at = set()
+        self._sheets = {}  # by mesh
         self.instances = 0
         # Light groups by name: 0 holds all that is in none.
         names = getattr(depsgraph.view_layer_eval, "lightgroups", ())
@@ -281,7 +282,7 @@ class Collector:
             slots = [override]
         else:
             slots = [slot.material for slot in ob.material_slots] or [None]
-        numbers = [self.materials.number(material) for material in slots]
+        numbers = [self.materials.number(material, lambda: self._is_sheet(mesh)) for material in slots]
         group = self._group(ob) if any(any(self.materials.converted[n].values.emission) for n in numbers) else 0
         key = (mesh.as_pointer(), tuple(numbers), group)
         if key not in self._meshes:
@@ -306,6 +307,14 @@ class Collector:
                 return
             target.transforms.append(transform)
             self.instances += 1
+
+    def _is_sheet(self, mesh):
+        """Whether a mesh is open: has edges of a single face."""
+        key = mesh.as_pointer()
+        if key not in self._sheets:
+            faces = np.bincount(fetch(mesh.loops, "edge_index", len(mesh.loops), 1, np.int32).ravel())
+            self._sheets[key] = bool((faces == 1).any())
+        return self._sheets[key]
 
     def _check_flags(self, ob):
         layer = self.depsgraph.view_layer_eval

@@ -94,6 +94,7 @@ class Surface:
     emission: Value = ZERO
     opacity: Value = ONE
     clear: bool = False  # lets light pass, and does nothing else
+    shadows_pass: bool = False  # glass that does not stop shadow rays
     rough_picture: Value = None  # `roughness` is its mean then
     by_place: ByPlace = None
     clearcoat: ClearCoat = None
@@ -172,20 +173,28 @@ class SurfaceReader(Evaluator):
                   for slot in ("diffuse", "metal", "glass", "coat", "gloss", "translucency", "emission", "opacity")}
         return Surface(roughness=roughness, ior=a.ior if luminance(a.glass) > luminance(b.glass) else b.ior,
                        rough_picture=picture, by_place=by_place, clearcoat=clearcoat, burley=a.burley if da >= db else b.burley,
-                       tint=a.tint if wa >= wb else b.tint, **summed)
+                       tint=a.tint if wa >= wb else b.tint, shadows_pass=a.shadows_pass or b.shadows_pass, **summed)
 
     def closure_mix_shader(self, node, stack):
-        f = self.value(node.inputs[0], stack)
+        a, b = self.surface(node.inputs[1], stack), self.surface(node.inputs[2], stack)
+        shadows_pass = a.clear != b.clear and luminance((b if a.clear else a).glass) > 0 and self.clear_to_shadows(node, stack, a.clear)
+        f = self.value_for("Is Camera Ray", node.inputs[0], stack) if shadows_pass else self.value(node.inputs[0], stack)
         if f.picture is None:
             f = Value(np.clip(f.factor, 0, 1))
-        a, b = self.surface(node.inputs[1], stack), self.surface(node.inputs[2], stack)
         rest = self.complement(f)
         if a.clear or b.clear:  # a cut-out: what is there keeps its colour
             kept, share = (b, f) if a.clear else (a, rest)
             if a.clear and b.clear:
                 return a
-            return dataclasses.replace(kept, opacity=self.multiply(share, kept.opacity))
+            return dataclasses.replace(kept, opacity=self.multiply(share, kept.opacity), shadows_pass=shadows_pass or kept.shadows_pass)
         return self.weighted(rest, a, f, b)
+
+    def clear_to_shadows(self, node, stack, first):
+        """Whether a mix has glass for the camera, and what lets light pass for shadow rays: windows are made so."""
+        def share(ray):
+            f = min(1.0, max(0.0, self.value_for(ray, node.inputs[0], stack).scalar()))
+            return 1 - f if first else f
+        return share("Is Shadow Ray") - share("Is Camera Ray") > 0.5
 
     def closure_add_shader(self, node, stack):
         a, b = self.surface(node.inputs[0], stack), self.surface(node.inputs[1], stack)
@@ -291,9 +300,6 @@ class SurfaceReader(Evaluator):
         self.note("Holdout", "Shaders left out")
         return Surface()
 
-    def note_glass(self, node):
-        self.note(node.bl_label, "Glass: lamps do not shine straight through it, their light passes along light paths alone")
-
     def loss(self, node, gloss, ior):
         """Factor of what passes glass; darker where the node lets rough glass lose light."""
         if getattr(node, "distribution", "") not in {"GGX", "BECKMANN"} or gloss["roughness"] < 0.15:
@@ -303,7 +309,6 @@ class SurfaceReader(Evaluator):
 
     def closure_bsdf_glass(self, node, stack):
         self.bumps(node, stack)
-        self.note_glass(node)
         colour = self.value(node.inputs["Color"], stack)
         ior, gloss = self.number(node.inputs["IOR"], stack, "IOR"), self.gloss(node, stack)
         through = self.multiply(self.multiply(colour, colour), self.loss(node, gloss, ior))
@@ -404,8 +409,6 @@ class SurfaceReader(Evaluator):
             through = self.multiply(through, self.loss(node, gloss, ior))
         glass = self.multiply(self.multiply(through, dielectric), transmission)
         metal = base if metallic.is_zero() else self.metal(node, base, gloss)
-        if not glass.is_zero():
-            self.note_glass(node)
         rough_glass = node.inputs.get("Transmission Roughness")
         if rough_glass is not None and not transmission.is_zero() and not self.value(rough_glass, stack).is_zero():
             self.note("transmission roughness", "Principled features left out")
@@ -445,13 +448,27 @@ class Materials:
         self.converted, self.pictures = [], []
         self._numbers, self._picture_numbers = {}, {}
 
-    def number(self, material):
-        """Index of a Blender material (None: the default grey)."""
+    def number(self, material, sheet=lambda: False):
+        """Index of a Blender material (None: the default grey) on a mesh; `sheet`: whether that is an open one, asked of
+        glass alone. Light goes straight through panes of a single sheet; bodies bend it."""
         key = None if material is None else material.name_full
         if key not in self._numbers:
             self._numbers[key] = len(self.converted)
             self.converted.append(self._convert(material))
-        return self._numbers[key]
+        number = self._numbers[key]
+        values = self.converted[number].values
+        if values.transmission <= 0 or values.flags & library.SHADOWS_PASS:
+            return number
+        if not sheet():
+            self.report.note(self.converted[number].name, "Glass bodies: lamps do not shine straight through them, their light passes along light paths alone")
+            return number
+        if (key, "sheet") not in self._numbers:
+            self._numbers[key, "sheet"] = len(self.converted)
+            values = type(values).from_buffer_copy(values)
+            values.flags |= library.SHADOWS_PASS
+            base = self.converted[number]
+            self.converted.append(dataclasses.replace(base, name=base.name + " (sheet)", values=values))
+        return self._numbers[key, "sheet"]
 
     def picture_number(self, picture):
         """1 + index among the scene's images."""
@@ -573,6 +590,8 @@ class Materials:
         whole = d + metal + glass
         m.metallic = metal / whole if whole > 0 else 0.0
         m.transmission = glass / (d + glass) if d + glass > 0 else 0.0
+        if surface.shadows_pass and m.transmission > 0:
+            m.flags |= library.SHADOWS_PASS
         opaque = (1 - m.metallic) * (1 - m.transmission)
         f0 = Value(coat.factor / opaque, coat.picture) if opaque > 1e-3 else ZERO
         return {**pictured, "diffuse": base, "specular": self._specular(f0, glass, name, m)}

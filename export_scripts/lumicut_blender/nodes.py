@@ -141,6 +141,8 @@ def blackbody(kelvin):
 class Evaluator:
     """Follows the sockets of one material, light or world. `owner` is the name that notes carry."""
 
+    ray = None  # the output of Light Path that says yes; None: the camera's, with a note
+
     def __init__(self, owner, images, report):
         self.owner, self.images, self.report = owner, images, report
 
@@ -327,7 +329,17 @@ class Evaluator:
             return self.by_view(("Backfacing",), lambda c, behind: np.full_like(c, float(behind)))
         return self._unknown(node, output, stack)
 
+    def value_for(self, ray, socket, stack):
+        """As one kind of ray has it: an output of Light Path such as "Is Shadow Ray"."""
+        self.ray, before = ray, self.ray
+        try:
+            return self.value(socket, stack)
+        finally:
+            self.ray = before
+
     def _light_path(self, node, output, stack):
+        if self.ray is not None:
+            return Value(1.0 if output.name == self.ray else 0.0)
         self.note("Light Path", "Nodes that depend on the ray, taken as for the camera's")
         return Value(1.0 if output.name == "Is Camera Ray" else 0.0)
 

@@ -374,7 +374,46 @@ class MaterialTrees(unittest.TestCase):
         self.assertEqual((out.transmission, out.metallic, out.roughness), (1, 0, 0))
         self.assertAlmostEqual(out.ior, 1.3, places=5)
         np.testing.assert_allclose(out.specular_tint, (0.5, 0.8, 1), rtol=1e-5)  # Cycles' Glass colours that too
-        self.assertTrue(any("Glass" in n and "Bottle" in n for n in notes))
+        self.assertFalse(any("Bottle" in n for n in notes))
+
+    def test_light_goes_straight_through_panes_and_not_through_bodies(self):
+        m = h.material("Bottle")
+        h.shader(m, "ShaderNodeBsdfGlass")
+        h.add_plane(material=m)
+        ball = h.add_sphere(segments=8)
+        ball.data.materials.append(m)
+        data, notes = collected()
+        passes = {mesh.name: bool(data.materials[mesh.material][1].flags & library.SHADOWS_PASS) for mesh in data.meshes}
+        self.assertEqual(passes, {"Plane": True, ball.name: False})
+        self.assertTrue(any("Glass bodies" in n and "Bottle" in n for n in notes))
+
+    def window(self, output, glass_first=True, kind="ShaderNodeBsdfGlass"):
+        m = h.material("Window")
+        mix = h.shader(m, "ShaderNodeMixShader")
+        nodes, links = m.node_tree.nodes, m.node_tree.links
+        glass, clear, path = nodes.new(kind), nodes.new("ShaderNodeBsdfTransparent"), nodes.new("ShaderNodeLightPath")
+        links.new(path.outputs[output], mix.inputs[0])
+        links.new(glass.outputs[0], mix.inputs[1 if glass_first else 2])
+        links.new(clear.outputs[0], mix.inputs[2 if glass_first else 1])
+        h.add_sphere(segments=8).data.materials.append(m)
+        data, notes = collected()
+        return dict(data.materials)["Window"], notes
+
+    def test_glass_that_is_clear_to_shadow_rays_lets_light_pass(self):
+        out, notes = self.window("Is Shadow Ray")
+        self.assertEqual(out.flags, library.GGX | library.SHADOWS_PASS)
+        self.assertEqual((out.transmission, out.opacity), (1, 1))
+        self.assertFalse(any("Window" in n for n in notes), notes)
+
+    def test_other_mixes_by_the_ray_are_taken_as_the_camera_has_them(self):
+        out, notes = self.window("Is Glossy Ray")
+        self.assertEqual(out.flags, library.GGX)
+        self.assertTrue(any("Light Path" in n for n in notes))
+
+    def test_what_is_not_glass_stops_shadow_rays(self):
+        out, notes = self.window("Is Shadow Ray", kind="ShaderNodeBsdfDiffuse")
+        self.assertEqual(out.flags & library.SHADOWS_PASS, 0)
+        self.assertTrue(any("Light Path" in n for n in notes))
 
     def test_principled_with_half_transmission(self):
         m, _ = self.principled(**{"Base Color": (0.6, 0.6, 0.6, 1), "Transmission|Transmission Weight": 0.5,
@@ -682,7 +721,7 @@ class MaterialTrees(unittest.TestCase):
         sheen.default_value = 0.5
         glass = h.material("Pane")
         h.shader(glass, "ShaderNodeBsdfGlass")
-        h.add_plane(material=glass, name="Window")
+        h.add_sphere(segments=8, name="Body").data.materials.append(glass)
         out, notes, _ = the_material(m)
         text = "\n".join(notes)
         for words in ("Noise Texture", "Normal and bump maps left out: Stuff", "sheen", "Pane", "Glass"):

@@ -120,7 +120,7 @@ class Farms(Blender):
         self.assertIsNotNone(image)
 
     def test_approximations_are_in_the_log_once(self):
-        more = "m = h.material('Fog'); n = h.shader(m, 'ShaderNodeBsdfGlass'); h.add_plane(1, 1, m, 'Pane')"
+        more = "m = h.material('Fog'); n = h.shader(m, 'ShaderNodeBsdfGlass'); h.add_sphere(0.2, (0, 0, 1), m)"
         done, _ = farm(self.home, make_room(self.home, more=more))
         self.assertEqual(len([l for l in done.stdout.splitlines() if "Glass" in l and "Fog" in l]), 1, done.stdout)
 
