@@ -291,8 +291,10 @@ bool Scene::passes_light(const LightHit& hit) const {
       const Transform& to_world = instance(hit.mesh, hit.inst - first_instance_[hit.mesh]);
       edges[0] = to_world.vector(edges[0]), edges[1] = to_world.vector(edges[1]), dir = to_world.vector(dir);
     }
-    const float cosine = dot(normalize(cross(edges[0], edges[1])), normalize(dir));
-    stops *= 1.0f - luminance(straight_transmittance(bsdf_parameters(id, uv_at(mesh, hit.prim, hit.u, hit.v)), cosine));
+    const Vec3f normal = normalize(cross(edges[0], edges[1])), to_viewer = -normalize(dir);
+    const SurfaceView view{{}, normal, normal, to_viewer, 0.0f};
+    const BsdfParameters glass = bsdf_parameters(id, uv_at(mesh, hit.prim, hit.u, hit.v), view);
+    stops *= 1.0f - luminance(straight_transmittance(glass, dot(normal, to_viewer)));
   }
   return passes_by_chance(stops, hit.mesh, hit.prim, hit.u, hit.v);
 }
