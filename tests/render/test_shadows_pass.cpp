@@ -125,6 +125,48 @@ TEST_P(ThroughGlass, WithoutTheFlagASunGivesNothing) {
   EXPECT_LT(render(*floor_under(Body::sheet, blocks, sun(0.7))).y, 1e-4f * kAlbedo);
 }
 
+// What the clamp takes is brought back by the whole distance, not by that from the glass on.
+TEST(Compensation, OfALampOrALitCeilingCloseBehindGlassGivesThePathTracersLight) {
+  for (const bool ceiling : {false, true}) {
+    auto scene = std::make_unique<Scene>(Scene::Config{"bvh", true});
+    scene->set_materials({test::diffuse(0.6f, 0.6f, 0.6f), pane()});
+    Mesh room;
+    test::add_quad(room, {-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, 0);
+    test::add_quad(room, {-2, -2, 0.5f}, {2, -2, 0.5f}, {2, 2, 0.5f}, {-2, 2, 0.5f}, 1);
+    Light lamp;
+    lamp.type = LightType::rectangle, lamp.position = {0, 0, 0.6f}, lamp.value = {4, 4, 4};
+    lamp.u = {0, 1, 0}, lamp.v = {1, 0, 0};
+    if (ceiling) {
+      test::add_quad(room, {-1, 1, 0.7f}, {1, 1, 0.7f}, {1, -1, 0.7f}, {-1, -1, 0.7f}, 0);
+      std::swap(lamp.u, lamp.v);  // shines up at it
+    }
+    scene->set_lights({lamp});
+    scene->add_mesh(std::move(room));
+    Camera camera;
+    camera.position = {0, 0, 0.4f};
+    camera.right = {1, 0, 0}, camera.forward = {0, 0, -1}, camera.up = {0, 1, 0}, camera.tan_half_fov_y = 1.0f;
+    scene->set_camera(camera);
+    Progress progress;
+    scene->commit(progress);
+    const test::RenderOptions options{.width = 32, .height = 32, .samples = 4};
+    const double truth =
+        mean_of(
+            test::render(*scene, "path_tracer", {}, {{"samples", test::kSanitized ? "16" : "256"}}, options).radiance)
+            .y;
+    double sum = 0;
+    constexpr uint64_t kIterations = test::trimmed(40);
+    for (uint64_t seed = 1; seed <= kIterations; ++seed)
+      sum += mean_of(test::render(*scene, "exhaustive", test::lights_of(*scene, 400, seed),
+                                  {{"compensate", "true"}, {"clamp_distance", "1"}, {"seed", std::to_string(seed)}},
+                                  options)
+                         .radiance)
+                 .y /
+             kIterations;
+    RecordProperty(ceiling ? "ceiling" : "lamp", std::to_string(sum / truth));
+    EXPECT_NEAR(sum / truth, 1.0, test::kSanitized ? 0.06 : 0.015) << ceiling;
+  }
+}
+
 // Light paths carry the colour itself.
 TEST(LightPaths, GoStraightThroughGlassWithItsColour) {
   const Rgb colour{0.81f, 0.16f, 0.36f};
