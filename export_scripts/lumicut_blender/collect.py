@@ -196,7 +196,7 @@ class Collector:
         self.profiles = lights.Profiles(self.report)
         self._meshes, self._flat = {}, []  # by what they are made from; those of flat instances
         self._looked_at = set()
-        self._sheets = {}  # by mesh
+        self._sheets = {}  # by mesh: whether it is open, and its extents
         self.instances = 0
         # Light groups by name: 0 holds all that is in none.
         names = getattr(depsgraph.view_layer_eval, "lightgroups", ())
@@ -282,7 +282,7 @@ class Collector:
             slots = [override]
         else:
             slots = [slot.material for slot in ob.material_slots] or [None]
-        numbers = [self.materials.number(material, lambda: self._is_sheet(mesh)) for material in slots]
+        numbers = [self.materials.number(material, lambda: self._is_pane(mesh, instance.matrix_world)) for material in slots]
         group = self._group(ob) if any(any(self.materials.converted[n].values.emission) for n in numbers) else 0
         key = (mesh.as_pointer(), tuple(numbers), group)
         if key not in self._meshes:
@@ -308,13 +308,16 @@ class Collector:
             target.transforms.append(transform)
             self.instances += 1
 
-    def _is_sheet(self, mesh):
-        """Whether a mesh is open: has edges of a single face."""
+    def _is_pane(self, mesh, matrix):
+        """Whether a mesh is open (has edges of a single face), or flat: at most a tenth as thick as wide."""
         key = mesh.as_pointer()
         if key not in self._sheets:
             faces = np.bincount(fetch(mesh.loops, "edge_index", len(mesh.loops), 1, np.int32).ravel())
-            self._sheets[key] = bool((faces == 1).any())
-        return self._sheets[key]
+            places = vertex_positions(mesh)
+            self._sheets[key] = bool((faces == 1).any()), np.ptp(places, axis=0) if len(places) else np.zeros(3)
+        is_open, extents = self._sheets[key]
+        thickness, width, _ = sorted(extents * np.abs(matrix.to_scale()))
+        return is_open or thickness <= 0.1 * width
 
     def _check_flags(self, ob):
         layer = self.depsgraph.view_layer_eval

@@ -448,9 +448,9 @@ class Materials:
         self.converted, self.pictures = [], []
         self._numbers, self._picture_numbers = {}, {}
 
-    def number(self, material, sheet=lambda: False):
-        """Index of a Blender material (None: the default grey) on a mesh; `sheet`: whether that is an open one, asked of
-        glass alone. Light goes straight through panes of a single sheet; bodies bend it."""
+    def number(self, material, pane=lambda: False):
+        """Index of a Blender material (None: the default grey) on a mesh; `pane`: whether that is a sheet or flat, asked of
+        glass alone. Light goes straight through panes; bodies bend it."""
         key = None if material is None else material.name_full
         if key not in self._numbers:
             self._numbers[key] = len(self.converted)
@@ -459,16 +459,16 @@ class Materials:
         values = self.converted[number].values
         if values.transmission <= 0 or values.flags & library.SHADOWS_PASS:
             return number
-        if not sheet():
+        if not pane():
             self.report.note(self.converted[number].name, "Glass bodies: lamps do not shine straight through them, their light passes along light paths alone")
             return number
-        if (key, "sheet") not in self._numbers:
-            self._numbers[key, "sheet"] = len(self.converted)
+        if (key, "pane") not in self._numbers:
+            self._numbers[key, "pane"] = len(self.converted)
             values = type(values).from_buffer_copy(values)
             values.flags |= library.SHADOWS_PASS
             base = self.converted[number]
-            self.converted.append(dataclasses.replace(base, name=base.name + " (sheet)", values=values))
-        return self._numbers[key, "sheet"]
+            self.converted.append(dataclasses.replace(base, name=base.name + " (pane)", values=values))
+        return self._numbers[key, "pane"]
 
     def picture_number(self, picture):
         """1 + index among the scene's images."""

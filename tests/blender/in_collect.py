@@ -382,9 +382,12 @@ class MaterialTrees(unittest.TestCase):
         h.add_plane(material=m)
         ball = h.add_sphere(segments=8)
         ball.data.materials.append(m)
+        flat = h.add_sphere(segments=8, name="Flat")
+        flat.data.materials.append(m)
+        flat.scale.z = 0.02
         data, notes = collected()
         passes = {mesh.name: bool(data.materials[mesh.material][1].flags & library.SHADOWS_PASS) for mesh in data.meshes}
-        self.assertEqual(passes, {"Plane": True, ball.name: False})
+        self.assertEqual(passes, {"Plane": True, ball.name: False, "Flat": True})
         self.assertTrue(any("Glass bodies" in n and "Bottle" in n for n in notes))
 
     def window(self, output, glass_first=True, kind="ShaderNodeBsdfGlass"):
