@@ -316,7 +316,7 @@ class Rooms(unittest.TestCase):
         np.testing.assert_allclose(middle, 1, atol=0.05)
 
     def test_lamps_shine_through_a_glass_window_as_in_cycles_when_compensated(self):
-        """A lamp outside, a pane, a table, a glass ball. Shadow rays stop at glass: uncompensated a third and more is lost."""
+        """A lamp outside, a pane, a table, a glass ball. Light goes straight through the pane; the ball stops shadow rays."""
         scene = h.new_scene(32, 24)
         scene.camera.location, scene.camera.rotation_euler = (0, -1.9, 1.2), (math.radians(85), 0, 0)
         scene.camera.data.lens = 20
@@ -346,5 +346,5 @@ class Rooms(unittest.TestCase):
                 means[compensate] = h.radiance(h.render()).mean() / cycles
         # The noise of 16 passes and of Cycles in the mean of 768 pixels: about 1 %, and caustics are rare and bright.
         self.assertAlmostEqual(means[True], 1, delta=0.05)
-        self.assertLess(means[False], 0.8)
+        self.assertAlmostEqual(means[False], 0.94, delta=0.04)  # without what the ball lets through; .6 where the pane stops it
         self.assertTrue(any("Glass" in note and "glass" in note for note in h.last_notes()), h.last_notes())
