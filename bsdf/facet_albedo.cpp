@@ -23,16 +23,12 @@ void fill(float* table, const Entry& entry) {
 }
 
 float look_up(const float* table, float alpha, float cosine) {
-  const auto place = [](float x, int steps, int& cell) {
-    const float at = std::sqrt(std::min(1.0f, std::max(0.0f, x))) * static_cast<float>(steps - 1);
-    cell = std::min(steps - 2, static_cast<int>(at));
-    return at - static_cast<float>(cell);
-  };
-  int r = 0, c = 0;
-  const float fr = place(alpha, kRoughness, r), fc = place(cosine, kCosines, c);
-  const float* row = table + r * kCosines + c;
-  const float low = row[0] + (row[1] - row[0]) * fc, high = row[kCosines] + (row[kCosines + 1] - row[kCosines]) * fc;
-  return low + (high - low) * fr;
+  const TablePlace r = table_place(std::sqrt(std::max(0.0f, alpha)), kRoughness),
+                   c = table_place(std::sqrt(std::max(0.0f, cosine)), kCosines);
+  const float* row = table + r.cell * kCosines + c.cell;
+  const float low = row[0] + (row[1] - row[0]) * c.rest,
+              high = row[kCosines] + (row[kCosines + 1] - row[kCosines]) * c.rest;
+  return low + (high - low) * r.rest;
 }
 
 struct MirrorLoss {

@@ -18,6 +18,17 @@ float mean_over_facets(float alpha, float cosine_to_viewer, const Share& share) 
   return sum / (kSteps * kSteps);
 }
 
+// Where x of 0 to 1 lies in a table of so many entries: the one before, and how far on to the next.
+struct TablePlace {
+  int cell;
+  float rest;
+};
+inline TablePlace table_place(float x, int entries) {
+  const float at = std::min(1.0f, std::max(0.0f, x)) * static_cast<float>(entries - 1);
+  const int cell = std::min(entries - 2, static_cast<int>(at));
+  return {cell, at - static_cast<float>(cell)};
+}
+
 // What one mirroring facet sends up and others do not mask.
 inline float unmasked_reflection(float alpha, const Vec3f& view, const Vec3f& half) {
   const float up = reflect(view, half).z;

@@ -42,16 +42,6 @@ struct Albedo {
   }
 };
 
-struct Place {
-  int cell;
-  float rest;
-};
-Place place_of(float x, int steps) {
-  const float at = std::min(1.0f, std::max(0.0f, x)) * static_cast<float>(steps - 1);
-  const int cell = std::min(steps - 2, static_cast<int>(at));
-  return {cell, at - static_cast<float>(cell)};
-}
-
 // What is looked up of an Albedo, linear in it.
 struct Seen {
   float albedo, straight, rise;
@@ -70,7 +60,7 @@ class RoughnessRow {
       of_[r] = Albedo::of(root * root, share);
     }
   }
-  Seen seen(const Place& r, const Place& c) const {
+  Seen seen(const TablePlace& r, const TablePlace& c) const {
     const auto one = [&](const Albedo& a) {
       return Seen{a.at[c.cell] + (a.at[c.cell + 1] - a.at[c.cell]) * c.rest, a.straight, a.rise};
     };
@@ -91,7 +81,7 @@ class ShareTable {
       rows_[k].fill([ior](float cosine) { return fresnel_share(cosine, ior); });
     }
   }
-  Seen seen(const Place& k, const Place& r, const Place& c) const {
+  Seen seen(const TablePlace& k, const TablePlace& r, const TablePlace& c) const {
     return between(rows_[k.cell].seen(r, c), rows_[k.cell + 1].seen(r, c), k.rest);
   }
 
@@ -120,9 +110,9 @@ const RoughnessRow& mirrors() {
 }  // namespace
 
 LobeTransmittance lobe_transmittance(float f0, float f90, float ior, float alpha, float cosine) {
-  const Place r = place_of(std::sqrt(std::max(0.0f, alpha)), kRoughness),
-              c = place_of(std::sqrt(std::max(0.0f, cosine)), kCosines),
-              k = place_of(std::sqrt(std::abs(ior - 1.0f) / (ior + 1.0f) / kLargestRoot), kRatios);
+  const TablePlace r = table_place(std::sqrt(std::max(0.0f, alpha)), kRoughness),
+                   c = table_place(std::sqrt(std::max(0.0f, cosine)), kCosines),
+                   k = table_place(std::sqrt(std::abs(ior - 1.0f) / (ior + 1.0f) / kLargestRoot), kRatios);
   const Seen all = mirrors().seen(r, c), share = shares_of(ior).seen(k, r, c);
   const float rest = f90 - f0, normal = 1.0f - f0 * all.straight - rest * share.straight;
   const float falloff = normal > 0.0f ? (f0 * all.rise + rest * share.rise) / normal : 0.0f;

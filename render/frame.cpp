@@ -131,9 +131,11 @@ class Batch {
     white.reserve(points_.size());
     for (size_t i = 0; i < points_.size(); ++i) {
       if (!further_.empty() && further_[i]) continue;  // its place has a point of its own
-      SurfacePoint point = points_.get(i);
-      point.diffuse = Rgb{1, 1, 1} * std::numbers::inv_pi_v<float>, point.specular = point.grazing = {};
-      point.lobe = kCosineLobe, point.shape = point.falloff = 0.0f;
+      const SurfacePoint place = points_.get(i);
+      SurfacePoint point;  // of its material it has nothing
+      point.position = place.position, point.normal = place.normal, point.mirror = place.mirror;
+      point.pixel = place.pixel;
+      point.diffuse = Rgb{1, 1, 1} * std::numbers::inv_pi_v<float>;
       white.push(point);
     }
     white.finish();

@@ -170,12 +170,12 @@ void Scene::set_trace(AccelFactory factory) {
 
 void Scene::check_references() const {
   const auto check_texture = [&](int32_t index, size_t material, const char* field, bool by_view = false) {
-    if (index >= 0 && static_cast<size_t>(index) < textures_.size() && textures_[index].is_by_view() && !by_view)
-      fail_argument(at("material", material) + "." + field + " = " + std::to_string(index) +
-                    " is a texture by view, which this field cannot have");
     if (index >= 0 && static_cast<size_t>(index) >= textures_.size())
       fail_argument(at("material", material) + "." + field + " = " + std::to_string(index) +
                     " is out of range: the scene has " + std::to_string(textures_.size()) + " textures");
+    if (index >= 0 && textures_[index].is_by_view() && !by_view)
+      fail_argument(at("material", material) + "." + field + " = " + std::to_string(index) +
+                    " is a texture by view, which this field cannot have");
   };
   for (size_t i = 0; i < materials_.size(); ++i) {
     check_texture(materials_[i].diffuse_texture, i, "diffuse_texture", true);
@@ -192,12 +192,11 @@ void Scene::check_references() const {
     if (lights_[i].profile != 0 && profiles_.find(lights_[i].profile) == nullptr)
       fail_argument(at("light", i) + ".profile = " + std::to_string(lights_[i].profile) +
                     " is none of the scene's profiles");
-  if (environment_.texture >= 0 && static_cast<size_t>(environment_.texture) < textures_.size() &&
-      textures_[environment_.texture].is_by_view())
-    fail_argument("environment.texture = " + std::to_string(environment_.texture) + " is a texture by view");
   if (environment_.texture >= 0 && static_cast<size_t>(environment_.texture) >= textures_.size())
     fail_argument("environment.texture = " + std::to_string(environment_.texture) + " is out of range: the scene has " +
                   std::to_string(textures_.size()) + " textures");
+  if (environment_.texture >= 0 && textures_[environment_.texture].is_by_view())
+    fail_argument("environment.texture = " + std::to_string(environment_.texture) + " is a texture by view");
   for (size_t m = 0; m < meshes_.size(); ++m) {
     const auto check = [&](uint32_t material) {
       if (material >= materials_.size())

@@ -132,7 +132,7 @@ class Scene final : private HitFilter {
   }
   // The material's description there, its textures looked up.
   BsdfParameters bsdf_parameters(uint32_t material, Vec2f uv, const SurfaceView& view = {}) const;
-  // Whether any material has a rough clear coat: points may have two layers.
+  // How many layers a point has at most, by the materials: rough clear coats and translucency add one each.
   size_t most_layers() const { return most_layers_; }
   // Whether any material may have a specular lobe.
   bool may_be_specular() const;

@@ -81,6 +81,9 @@ class ByPlace:
     f0: Value    # of the dielectric's share
 
 
+REFLECTED = ("diffuse", "metal", "glass", "coat", "gloss", "translucency")  # fields of Surface: closures' colours
+
+
 @dataclasses.dataclass
 class Surface:
     diffuse: Value = ZERO
@@ -142,13 +145,17 @@ class SurfaceReader(Evaluator):
         wa, wb = f.scalar() * gloss(a), g.scalar() * gloss(b)
         if wa > 0 and wb > 0 and abs(a.roughness - b.roughness) > 0.05:
             self.note("", "Several glossy lobes in one material, taken as one")
-        roughness = (wa * a.roughness + wb * b.roughness) / (wa + wb) if wa + wb > 0 else a.roughness
-        picture = a.rough_picture if wb <= 0 else b.rough_picture if wa <= 0 else None
+        da, db = f.scalar() * luminance(a.diffuse), g.scalar() * luminance(b.diffuse)
+        if wa + wb > 0:
+            roughness = (wa * a.roughness + wb * b.roughness) / (wa + wb)
+            picture = a.rough_picture if wb <= 0 else b.rough_picture if wa <= 0 else None
+        else:
+            roughness, picture = (a.roughness, a.rough_picture) if da >= db else (b.roughness, b.rough_picture)
         if picture is None and (wa > 0 and a.rough_picture or wb > 0 and b.rough_picture):
             self.note("roughness", "Textures taken as their mean")
 
         def weight(h, s):
-            return h.scalar() * sum(luminance(getattr(s, slot)) for slot in ("diffuse", "metal", "glass", "coat", "gloss", "translucency"))
+            return h.scalar() * sum(luminance(getattr(s, slot)) for slot in REFLECTED)
 
         by_place = None
         if a.by_place or b.by_place:
@@ -157,12 +164,8 @@ class SurfaceReader(Evaluator):
                 by_place = of.by_place
             else:
                 self.note("metallic", "Textures taken as their mean")
-        da, db = f.scalar() * luminance(a.diffuse), g.scalar() * luminance(b.diffuse)
         if da > 0 and db > 0 and a.burley != b.burley:
             self.note("", "Diffuse parts of two models in one material, taken as the stronger one's")
-        if wa + wb <= 0:
-            roughness = a.roughness if da >= db else b.roughness
-            picture = a.rough_picture if da >= db else b.rough_picture
         coats = [(h.scalar(), s.clearcoat) for h, s in ((f, a), (g, b)) if s.clearcoat and h.scalar() > 0]
         clearcoat = None
         if coats:
@@ -170,7 +173,7 @@ class SurfaceReader(Evaluator):
             clearcoat = ClearCoat(min(1.0, whole), sum(h * c.share * c.roughness for h, c in coats) / whole,
                                   max(coats, key=lambda x: x[0] * x[1].share)[1].ior)
         summed = {slot: self.add(self.multiply(f, getattr(a, slot)), self.multiply(g, getattr(b, slot)))
-                  for slot in ("diffuse", "metal", "glass", "coat", "gloss", "translucency", "emission", "opacity")}
+                  for slot in (*REFLECTED, "emission", "opacity")}
         return Surface(roughness=roughness, ior=a.ior if luminance(a.glass) > luminance(b.glass) else b.ior,
                        rough_picture=picture, by_place=by_place, clearcoat=clearcoat, burley=a.burley if da >= db else b.burley,
                        tint=a.tint if wa >= wb else b.tint, shadows_pass=a.shadows_pass or b.shadows_pass, **summed)

@@ -8,14 +8,15 @@ using namespace box;
 constexpr double kPi = 3.14159265358979;
 constexpr double kLumenPerWatt = 683;
 
-// A wide floor at z = 0 that reflects 40 %, seen from above by one pixel on the axis of the lamp.
-double lux_below(const lumicut_light& light, const char* integrator, int vpls = 20000) {
+// A wide floor at z = 0 that reflects 40 %, seen from above by one pixel on the axis of the lamp. `flags`: of its material.
+double lux_below(const lumicut_light& light, const char* integrator, int vpls = 20000, uint32_t flags = 0) {
   const api::Device device(2);
   api::Scene s(device);
   Geometry g;
   g.quad({{{-50, -50, 0}, {50, -50, 0}, {50, 50, 0}, {-50, 50, 0}}}, 0);
   std::vector<lumicut_material> m(1, make<lumicut_material>());
   m[0].diffuse[0] = m[0].diffuse[1] = m[0].diffuse[2] = 0.4f;
+  m[0].flags = flags;
   s.set_materials(m);
   s.add_mesh(g.mesh());
   s.set_lights({light});
@@ -70,6 +71,14 @@ TEST(Illuminance, OfASunIsItsIrradiance) {
   auto l = lamp_of(LUMICUT_SUN, 2, 0);
   l.direction[2] = -1;
   EXPECT_NEAR(lux_below(l, "lightcuts") / (kLumenPerWatt * 2), 1.0, 0.01);
+}
+
+// Burley's diffuse, of a smooth surface, gives back a sixth less of such a sun; GGX has a falloff towards it.
+TEST(Illuminance, DoesNotDependOnTheMaterial) {
+  auto l = lamp_of(LUMICUT_SUN, 2, 0);
+  l.direction[0] = std::sqrt(1 - 0.2f * 0.2f), l.direction[2] = -0.2f;
+  for (const uint32_t flags : {0u, uint32_t{LUMICUT_GGX}, uint32_t{LUMICUT_GGX | LUMICUT_BURLEY}})
+    EXPECT_NEAR(lux_below(l, "lightcuts", 20000, flags) / (kLumenPerWatt * 2 * 0.2), 1.0, 0.01) << flags;
 }
 
 TEST(Illuminance, IsZeroUnlessAskedFor) {

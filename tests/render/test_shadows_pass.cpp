@@ -25,6 +25,15 @@ Material pane(const Rgb& colour = {1, 1, 1}) {
   return m;
 }
 
+// From a height above the origin.
+Camera looking_down(float height, float tan_half_fov_y) {
+  Camera camera;
+  camera.position = {0, 0, height};
+  camera.right = {1, 0, 0}, camera.forward = {0, 0, -1}, camera.up = {0, 1, 0};
+  camera.tan_half_fov_y = tan_half_fov_y;
+  return camera;
+}
+
 enum class Body { sheet, slab };
 
 // A wide floor under wide glass, and a camera beneath it that sees a small place at the origin.
@@ -39,10 +48,7 @@ std::unique_ptr<Scene> floor_under(Body body, const Material& glass, const Light
     test::add_box(window, {-40, -40, 2}, {40, 40, 2.1f}, 1, false);
   scene->add_mesh(std::move(floor)), scene->add_mesh(std::move(window));
   scene->set_lights({light});
-  Camera camera;
-  camera.position = {0, 0, 1};
-  camera.right = {1, 0, 0}, camera.forward = {0, 0, -1}, camera.up = {0, 1, 0}, camera.tan_half_fov_y = 0.05f;
-  scene->set_camera(camera);
+  scene->set_camera(looking_down(1.0f, 0.05f));
   Progress progress;
   scene->commit(progress);
   return scene;
@@ -142,10 +148,7 @@ TEST(Compensation, OfALampOrALitCeilingCloseBehindGlassGivesThePathTracersLight)
     }
     scene->set_lights({lamp});
     scene->add_mesh(std::move(room));
-    Camera camera;
-    camera.position = {0, 0, 0.4f};
-    camera.right = {1, 0, 0}, camera.forward = {0, 0, -1}, camera.up = {0, 1, 0}, camera.tan_half_fov_y = 1.0f;
-    scene->set_camera(camera);
+    scene->set_camera(looking_down(0.4f, 1.0f));
     Progress progress;
     scene->commit(progress);
     const test::RenderOptions options{.width = 32, .height = 32, .samples = 4};
