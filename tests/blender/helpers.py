@@ -114,6 +114,9 @@ def add_sphere(radius=1.0, location=(0, 0, 0), material=None, segments=24, smoot
     mesh = bpy.data.meshes.new(name)
     b = bmesh.new()
     bmesh.ops.create_uvsphere(b, u_segments=segments, v_segments=segments // 2, radius=radius)
+    # In an order of their own: the operator's differs each time, and so would the lights on them.
+    n = len(b.verts)
+    b.faces.sort(key=lambda face: sum(v * n ** (2 - k) for k, v in enumerate(sorted(v.index for v in face.verts)[:3])))
     b.to_mesh(mesh)
     b.free()
     if material is not None:
