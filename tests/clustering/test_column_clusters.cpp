@@ -19,8 +19,8 @@ struct Lighting {
   ShadePoints rows;
   LightMatrix matrix;
 
-  explicit Lighting(size_t count, size_t row_count = 40) {
-    Rng rng(5, Stage::test);
+  explicit Lighting(size_t count, size_t row_count = 40, uint64_t seed = 5) {
+    Rng rng(seed, Stage::test);
     std::vector<Vpl> made;
     for (size_t i = 0; i < count; ++i) {
       Vpl v = test::random_light(rng, static_cast<VplKind>(i % 4), 0.95f);
@@ -156,18 +156,24 @@ TEST(ColumnClusters, SplitsPartitionTheColumnsAndLowerTheCost) {
 }
 
 TEST(ColumnClusters, SplitsDoWhatSamplingDoesAboutAsWell) {
-  const Lighting s(3000);
-  const std::vector<float> ones(s.rows.size(), 1.0f);
   const Progress progress;
-  double cost[2] = {};
-  for (int k = 0; k < 2; ++k) {
-    ColumnClusters clusters(s.matrix, ones);
-    if (k == 1) clusters.sample(200, 1, progress);
-    clusters.split(200, progress);
-    for (const auto& c : clusters.clusters()) cost[k] += c.cost;
+  double ratios = 0;  // logarithms
+  constexpr uint64_t kScenes = 6;
+  for (uint64_t scene = 0; scene < kScenes; ++scene) {
+    const Lighting s(3000, 40, 5 + scene);
+    const std::vector<float> ones(s.rows.size(), 1.0f);
+    double cost[2] = {};
+    for (int k = 0; k < 2; ++k) {
+      ColumnClusters clusters(s.matrix, ones);
+      if (k == 1) clusters.sample(200, 1, progress);
+      clusters.split(200, progress);
+      for (const auto& c : clusters.clusters()) cost[k] += c.cost;
+    }
+    ratios += std::log(cost[0] / cost[1]) / kScenes;
   }
-  // Which is ahead differs from scene to scene, by up to 8 % where this was tried.
-  EXPECT_LT(cost[0], 1.15 * cost[1]);
+  // Which is ahead by a few percent differs from scene to scene.
+  RecordProperty("ratio", std::to_string(std::exp(ratios)));
+  EXPECT_LT(std::exp(ratios), 1.05);
 }
 
 TEST(ColumnClusters, ColumnsThatDifferByAFactorAreOneCluster) {
