@@ -113,7 +113,9 @@ LobeTransmittance lobe_transmittance(float f0, float f90, float ior, float alpha
   const TablePlace r = table_place(std::sqrt(std::max(0.0f, alpha)), kRoughness),
                    c = table_place(std::sqrt(std::max(0.0f, cosine)), kCosines),
                    k = table_place(std::sqrt(std::abs(ior - 1.0f) / (ior + 1.0f) / kLargestRoot), kRatios);
-  const Seen all = mirrors().seen(r, c), share = shares_of(ior).seen(k, r, c);
+  Seen all = mirrors().seen(r, c), share = shares_of(ior).seen(k, r, c);
+  // A mirror's are known: the table would blur the step where total reflection begins.
+  if (alpha < kLeastAlpha) all.albedo = 1.0f, share.albedo = fresnel_share(cosine, ior);
   const float rest = f90 - f0, normal = 1.0f - f0 * all.straight - rest * share.straight;
   const float falloff = normal > 0.0f ? (f0 * all.rise + rest * share.rise) / normal : 0.0f;
   return {std::max(0.0f, 1.0f - f0 * all.albedo - rest * share.albedo), std::min(1.0f, std::max(0.0f, falloff))};

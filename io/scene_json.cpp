@@ -312,7 +312,7 @@ class SceneReader {
     if (auto both = object.find("emit_both_sides"))
       m.flags =
           (m.flags & ~uint32_t{LUMICUT_EMIT_BOTH_SIDES}) | (both->boolean() ? uint32_t{LUMICUT_EMIT_BOTH_SIDES} : 0u);
-    const auto texture = [&](const char* key, int32_t& out, TextureUse use) {
+    const auto texture = [&](const char* key, int32_t& out, TextureUse use, bool by_view = false) {
       const auto value = object.find(key);
       if (!value) return;
       const auto user = fmt::format("material \"{}\" ({}: {})", name, path_, value->path());
@@ -328,17 +328,19 @@ class SceneReader {
         flag("clamp", LUMICUT_CLAMP);
         flag("nearest", LUMICUT_NEAREST);
         flag("by_view", LUMICUT_BY_VIEW);
+        if (auto given = keys.find("by_view"); given && given->boolean() && !by_view)
+          given->fail("is for diffuse, specular, translucency, roughness and metallic textures alone");
         keys.finish();
         out = textures_.get(resolve(file), use, flags, user);
       } else {
         out = textures_.get(resolve(*value), use, 0, user);
       }
     };
-    texture("diffuse_texture", m.diffuse_texture, TextureUse::colour);
-    texture("specular_texture", m.specular_texture, TextureUse::colour);
+    texture("diffuse_texture", m.diffuse_texture, TextureUse::colour, true);
+    texture("specular_texture", m.specular_texture, TextureUse::colour, true);
     texture("opacity_texture", m.opacity_texture, TextureUse::mask);
     texture("emission_texture", m.emission_texture, TextureUse::colour);
-    texture("translucency_texture", m.translucency_texture, TextureUse::colour);
+    texture("translucency_texture", m.translucency_texture, TextureUse::colour, true);
     texture("normal_texture", m.normal_texture, TextureUse::vectors);
     if (auto strength = object.find("normal_strength"))
       m.normal_strength = static_cast<float>(strength->number(1e-3, 10));
@@ -353,8 +355,8 @@ class SceneReader {
     for (const char* key : {"roughness_texture", "metallic_texture"})
       if (auto given = object.find(key); given && !ggx && !given->raw().is_null())
         given->fail("is of the model \"ggx\" alone");
-    texture("roughness_texture", m.roughness_texture, TextureUse::numbers);
-    texture("metallic_texture", m.metallic_texture, TextureUse::numbers);
+    texture("roughness_texture", m.roughness_texture, TextureUse::numbers, true);
+    texture("metallic_texture", m.metallic_texture, TextureUse::numbers, true);
   }
 
   void read_materials(const JsonValue& value) {

@@ -402,8 +402,10 @@ class Examiner {
     double reflected = 0, total = 0;
     for (size_t m = 0; m < area.size(); ++m) {
       const auto& v = scene_.materials[m].values;
-      const Point albedo = textured(v.diffuse, v.diffuse_texture) + textured(v.specular, v.specular_texture) +
-                           textured(v.translucency, v.translucency_texture);
+      Point albedo = textured(v.diffuse, v.diffuse_texture) + textured(v.translucency, v.translucency_texture);
+      // With Fresnel's curve it is a factor of what a coat reflects, which leaves the rest to what is beneath.
+      const bool coated = (v.flags & LUMICUT_GGX) != 0 && (v.flags & LUMICUT_NO_FRESNEL) == 0;
+      if (!coated) albedo = albedo + textured(v.specular, v.specular_texture);
       if (area[m] > 0 && largest(albedo) > 1.0 + 1e-4)
         say("albedo_above_one",
             fmt::format("material \"{}\": diffuse, specular and translucency together give back {:.3g} of the light",

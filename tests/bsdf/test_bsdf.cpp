@@ -282,6 +282,19 @@ TEST(Bsdf, CoatsOfBurleysSurfacesTakeNothingFromThem) {
   EXPECT_GT(coated.evaluate(light).x, bare.evaluate(light).x);
 }
 
+TEST(Bsdf, AMirrorOfAnyIndexAndItsWhiteBaseGiveBackAllLight) {
+  for (const float ior : {0.1f, 0.3f, 0.5f, 0.67f, 0.9f, 1.1f, 1.5f, 3.0f, 10.0f})
+    for (const float cosine : {0.05f, 0.3f, 0.6f, 0.8f, 0.9f, 1.0f}) {
+      Material m;
+      m.lobe = LobeModel::ggx, m.roughness = 0, m.diffuse = m.specular = {1, 1, 1}, m.ior = ior;
+      const Bsdf bsdf = seen_from(direction_at(cosine, 0), m);
+      const SurfacePoint base = bsdf.layers()[0];
+      const float diffuse = base.diffuse.x * std::numbers::pi_v<float> * mean_diffuse_falloff(base.falloff);
+      const auto mirrored = bsdf.sample_specular(0.5f, 0.5f, 0.5f);
+      EXPECT_NEAR(diffuse + (mirrored ? mirrored->weight.x : 0.0f), 1.0f, 1e-3f) << ior << " " << cosine;
+    }
+}
+
 TEST(Bsdf, MetalsEdgeTintIsItsColourAt82Degrees) {
   Material m;
   m.lobe = LobeModel::ggx, m.metallic = 1, m.roughness = 0, m.diffuse = {0.9f, 0.6f, 0.3f};

@@ -267,6 +267,8 @@ TEST(SceneJson, GgxHasItsOwnParameters) {
   expect_in(wrong({{"name", "a"}, {"specular_tint", {1, 1, 1}}}), {"specular_tint", "\"ggx\" alone"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"specular_tint", {1, 1, 0}}}), {"specular_tint", "0"});
   expect_in(wrong({{"name", "a"}, {"translucency", {0, 0, 1.5}}}), {"translucency", "1.5"});
+  expect_in(wrong({{"name", "a"}, {"emission_texture", {{"file", "a.exr"}, {"by_view", true}}}}),
+            {"materials[", "emission_texture.by_view", "is for diffuse"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"fresnel", false}, {"metallic", 0.5}}), {"metallic", "must be 0"});
   expect_in(wrong({{"name", "a"}, {"roughness", 0.5}}), {"roughness", "\"ggx\" alone"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"shininess", 5}}), {"shininess", "not of the model \"ggx\""});

@@ -124,6 +124,12 @@ class Check(Base):
         self.assert_suspects("albedo_above_one", lambda s: s["materials"].append(
             {"name": "chrome", "diffuse": [0.5, 0.5, 0.5], "specular": [0.9, 0.9, 0.9]}) or s["meshes"][2].update(material="chrome"),
             "chrome", "1.4")
+        # A GGX coat's factor is no reflectance: what the coat leaves is all that the base gets.
+        self.assertEqual(self.kinds(lambda s: s["materials"].append(
+            {"name": "paint", "model": "ggx", "diffuse": [0.3, 0.3, 0.3]}) or s["meshes"][2].update(material="paint")), set())
+        self.assert_suspects("albedo_above_one", lambda s: s["materials"].append(
+            {"name": "mix", "model": "ggx", "fresnel": False, "diffuse": [0.6, 0.6, 0.6], "specular": [0.8, 0.8, 0.8]})
+            or s["meshes"][2].update(material="mix"), "mix", "1.4")
         self.assert_suspects("albedo_near_one", lambda s: s["materials"][0].update(diffuse=[0.99, 0.99, 0.99]), "99.0 %")
 
     def test_scenes_far_from_the_origin_are_named(self):

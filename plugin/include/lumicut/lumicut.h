@@ -140,7 +140,7 @@ typedef struct lumicut_material {
   float coat_roughness;    /* 0..1, as roughness */
   float coat_ior;          /* 1..10; 0: not given, taken as 1.5 */
   /* Any model */
-  float translucency[3];   /* as diffuse: share of the light that leaves evenly on the other side; diffuse + translucency <= 1 keeps energy */
+  float translucency[3];   /* as diffuse: share of the light that leaves evenly on the other side; diffuse + translucency <= 1 keeps energy. GGX's coat, metal and glass take nothing from it */
   int32_t translucency_texture; /* 1 + index; 0: none. Multiplies */
   /* LUMICUT_GGX alone */
   float specular_tint[3];      /* 0..1: of metal at 82 degrees, over its colour there; of what glass reflects; all 0: not given, taken as 1 */
