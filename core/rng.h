@@ -27,7 +27,7 @@ enum class Stage : uint32_t {
   reference,
   test,
   octree_shift,
-  eye_ray,
+  compensation,
   path,
   nearby_lights
 };

@@ -37,46 +37,15 @@ struct PeerRecord {
 };
 static_assert(sizeof(PeerRecord) == 36);
 
-bool all_finite(const float* values, int n) {
-  for (int i = 0; i < n; ++i)
-    if (!std::isfinite(values[i])) return false;
-  return true;
-}
-
-[[noreturn]] void fail_light(const std::string& path, uint64_t index, const std::string& text) {
-  throw FileError(path, fmt::format("light {}: {}", index, text));
-}
-
-void check(const std::string& path, uint64_t index, lumicut_vpl& light) {
-  const auto fail = [&](const std::string& text) { fail_light(path, index, text); };
-  const auto shown = [](const float* v) { return fmt::format("({}, {}, {})", v[0], v[1], v[2]); };
-  if (light.kind > LUMICUT_VPL_SPHERE) fail(fmt::format("kind is {}, but must be 0 to 4", light.kind));
-  if (light.kind != LUMICUT_VPL_DIRECTIONAL && !all_finite(light.position, 3))
-    fail("position is " + shown(light.position));
-  for (const float i : light.intensity)
-    if (!std::isfinite(i) || i < 0)
-      fail("intensity is " + shown(light.intensity) + ", but must be finite and not negative");
+// What other programs leave in fields of their own or scale as they like; values are the library's to check.
+void tidy(lumicut_vpl& light) {
   if (light.kind != LUMICUT_VPL_SPOT) light.profile = 0;
-  if (!all_finite(&light.cos_outer, 4)) fail("the spot cone is not finite");
-  if (light.kind == LUMICUT_VPL_SPHERE && !(light.cos_outer > 0))
-    fail(fmt::format("the sphere's radius is {}, but must be above 0", light.cos_outer));
   if (light.kind == LUMICUT_VPL_OMNI) return;
   double length = 0;
   for (const float n : light.normal) length += double{n} * n;
   length = std::sqrt(length);
-  if (!std::isfinite(length) || length < 1e-6) fail("normal is " + shown(light.normal) + ", but must be a direction");
-  if (std::abs(length - 1) > 1e-6)  // a unit vector in float stays as it is, bit for bit
+  if (std::isfinite(length) && length >= 1e-6 && std::abs(length - 1) > 1e-6)  // unit vectors stay, bit for bit
     for (float& n : light.normal) n = static_cast<float>(double{n} / length);
-}
-
-void check(const std::string& path, uint64_t index, const lumicut_vpl_origin& origin) {
-  const auto fail = [&](const std::string& text) { fail_light(path, index, text); };
-  const bool area = origin.source == LUMICUT_SOURCE_AREA;
-  if (origin.source > LUMICUT_SOURCE_AREA) fail(fmt::format("source is {}, but must be 0 to 2", origin.source));
-  if (!std::isfinite(origin.offset) || origin.offset < 0)
-    fail(fmt::format("offset is {}, but must be finite and not negative", origin.offset));
-  if (!std::isfinite(origin.area) || (area ? origin.area <= 0 : origin.area != 0))
-    fail(fmt::format("area is {}, but must be {}", origin.area, area ? "finite and above 0" : "0 for its source"));
 }
 
 // A file that starts with our name.
@@ -100,18 +69,12 @@ api::VplSet read_own(const std::string& path, const std::string& bytes) {
         path, fmt::format("says {} lights, but holds {} bytes of them, {} each", header.count, room, record_size));
   api::VplSet set;
   set.lights.reserve(header.count), set.origins.reserve(header.count);
-  uint64_t areas = 0;
   for (uint64_t i = 0; i < header.count; ++i) {
     Record record{};
     std::memcpy(&record, bytes.data() + header_size + i * record_size, record_size);
-    check(path, i, record.origin);
-    if (record.origin.source == LUMICUT_SOURCE_AREA) ++areas;
     set.lights.push_back(record.light), set.origins.push_back(record.origin);
   }
   if (header.version == 1) return set;
-  if (header.emitter_samples < areas)
-    throw FileError(path,
-                    fmt::format("says {} samples of emitters, but {} lights are such", header.emitter_samples, areas));
   set.light_paths = header.light_paths, set.emitter_samples = header.emitter_samples;
   return set;
 }
@@ -149,8 +112,18 @@ api::VplSet read_vpls(const std::string& path) {
   const std::string bytes = read_whole_file(path, uint64_t{64} << 30);
   const bool own = bytes.size() >= sizeof(kMagic) && std::memcmp(bytes.data(), kMagic, sizeof(kMagic)) == 0;
   api::VplSet set = own ? read_own(path, bytes) : read_peers(path, bytes);
-  for (uint64_t i = 0; i < set.lights.size(); ++i) check(path, i, set.lights[i]);
+  for (lumicut_vpl& light : set.lights) tidy(light);
   return set;
+}
+
+void upload_vpls(const api::Functions& library, lumicut_integrator integrator, const api::VplSet& set,
+                 const std::string& path) {
+  try {
+    api::set_vpls(integrator, set, library);
+  } catch (const api::Exception& error) {
+    if (error.code() != LUMICUT_INVALID_ARGUMENT) throw;
+    throw FileError(path, error.what());
+  }
 }
 
 void write_vpls(const std::string& path, const api::VplSet& set) {

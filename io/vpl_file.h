@@ -7,10 +7,13 @@
 
 namespace lumicut::io {
 
-// Throws FileError naming the record and field: wrong length, unknown kind, numbers that are not finite, negative
-// intensities, normals of length 0, origins that cannot be. Normals are brought to length 1. Files without origins
-// (version 1, the peer's) give lights of which nothing is known.
+// Throws FileError for wrong lengths and versions. Normals are brought to length 1; all other values are for the library
+// to check, by upload_vpls. Files without origins (version 1, the peer's) give lights of which nothing is known.
 api::VplSet read_vpls(const std::string& path);
+
+// Gives an integrator the lights of file `path`. Throws FileError with the library's words where it refuses a value.
+void upload_vpls(const api::Functions& library, lumicut_integrator integrator, const api::VplSet& set,
+                 const std::string& path);
 
 // Atomic. Lights without origins are written as lights of which nothing is known. Throws FileError.
 void write_vpls(const std::string& path, const api::VplSet& set);

@@ -90,7 +90,7 @@ void ClampCompensation::trace(const ShadePoints& points, uint32_t level, const P
   for (size_t i = 0; i < points.size(); ++i) {
     if (i % 4096 == 0) progress.check();
     const SurfacePoint point = points.get(i);
-    Rng rng = rng_at_point(scene_, point, hash64(seed_, level), Stage::eye_ray);
+    Rng rng = rng_at_point(scene_, point, hash64(seed_, level), Stage::compensation);
     const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float();
     const auto s = PointBsdf(point).sample(choice, u, v);
     if (!s || !is_finite(s->weight)) continue;

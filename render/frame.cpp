@@ -271,7 +271,7 @@ class Batch {
   std::optional<ChainRay> start_chain_of(const Bsdf& bsdf, size_t p, size_t sample) const {
     const auto [x, y] = pixels_[p];
     return start_chain(bsdf, {1, 1, 1}, static_cast<uint32_t>(p),
-                       Rng(hash64(options_.seed, sample), Stage::eye_ray, x, y));
+                       Rng(hash64(options_.seed, sample), Stage::compensation, x, y));
   }
 
   struct Pixel {

@@ -164,7 +164,7 @@ class FlythroughCommand {
     if (o_.vpl_in.empty()) return;
     const api::VplSet lights = io::read_vpls(o_.vpl_in);
     if (lights.lights.empty()) throw UsageError(fmt::format("--vpl-in {}: holds no light", o_.vpl_in));
-    api::set_vpls(integrator_.get(), lights, api(), o_.vpl_in);
+    io::upload_vpls(api(), integrator_.get(), lights, o_.vpl_in);
   }
 
   void prepare() {

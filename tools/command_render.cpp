@@ -213,7 +213,7 @@ class RenderCommand {
   }
 
   void set_lights() {
-    if (!o_.vpl_in.empty()) api::set_vpls(integrator_.get(), lights_, api(), o_.vpl_in);
+    if (!o_.vpl_in.empty()) io::upload_vpls(api(), integrator_.get(), lights_, o_.vpl_in);
   }
 
   void commit() {

@@ -5,6 +5,7 @@
 
 #include "scene/scene.h"
 #include "tests/support/test_scenes.h"
+#include "tests/support/trimmed.h"
 
 namespace lumicut {
 namespace {
@@ -140,7 +141,7 @@ TEST(Bsdf, WeightIsReflectanceTimesCosineOverDensity) {
 
 // Reflected share of light that comes evenly from everywhere, by steps over the hemisphere that are fine where the
 // lobe is.
-double albedo(const SurfacePoint& p, int channel, int samples = 20000) {
+double albedo(const SurfacePoint& p, int channel, int samples = static_cast<int>(test::trimmed(20000))) {
   const PointBsdf bsdf(p);
   double sum = 0;
   for (int i = 0; i < samples; ++i) {
@@ -414,7 +415,7 @@ TEST(Bsdf, ATranslucentSheetSpreadsWhatItReflectsAndWhatItPassesEachToItsSide) {
       EXPECT_LT(other.normal.z * side, 0.0f);
       Rng rng(12, Stage::test);
       double sampled[2] = {}, integral[2] = {}, density = 0, carried[2] = {};
-      constexpr int kSamples = 200000;
+      constexpr auto kSamples = static_cast<int>(test::trimmed(200000));
       for (int i = 0; i < kSamples; ++i) {
         const float layer = rng.next_float(), choice = rng.next_float(), u = rng.next_float(), v = rng.next_float();
         if (const auto s = bsdf.sample(layer, choice, u, v)) {
@@ -430,12 +431,12 @@ TEST(Bsdf, ATranslucentSheetSpreadsWhatItReflectsAndWhatItPassesEachToItsSide) {
         integral[d.z * side < 0.0f] += bsdf.evaluate(d).y * std::abs(d.z) * 12.5663706f / kSamples;
         density += bsdf.pdf(d) * 12.5663706f / kSamples;
       }
-      EXPECT_NEAR(integral[1], m.translucency.y, 0.01) << "all that is passed, whatever the view";
+      EXPECT_NEAR(integral[1], m.translucency.y, test::trimmed_noise(0.01)) << "all that is passed, whatever the view";
       for (int k = 0; k < 2; ++k) {
-        EXPECT_NEAR(sampled[k], integral[k], 0.01);
-        EXPECT_NEAR(carried[k], integral[k], 0.01);
+        EXPECT_NEAR(sampled[k], integral[k], test::trimmed_noise(0.01));
+        EXPECT_NEAR(carried[k], integral[k], test::trimmed_noise(0.01));
       }
-      EXPECT_NEAR(density, 1.0, 0.03) << "but for glossy samples below the horizon";
+      EXPECT_NEAR(density, 1.0, test::trimmed_noise(0.03)) << "but for glossy samples below the horizon";
     }
 }
 

@@ -3,6 +3,7 @@
 // beyond any memory, so that the library must refuse it unread.
 #include <fuzzer/FuzzedDataProvider.h>
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <cstring>
@@ -11,6 +12,7 @@
 #include <limits>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <thread>
 
 #include "lumicut/lumicut_lights.h"
@@ -21,6 +23,28 @@
 namespace {
 
 using box::api::make;
+
+const std::vector<const char*>& integrator_ids() {
+  static const auto all = [] {
+    std::vector<const char*> ids;
+    for (const auto& integrator : box::api::integrators()) ids.push_back(integrator.id);
+    return ids;
+  }();
+  return all;
+}
+
+// Of any integrator.
+const std::vector<const char*>& parameter_names() {
+  static const auto all = [] {
+    std::vector<const char*> names;
+    for (const char* integrator : integrator_ids())
+      for (const auto& parameter : box::api::params(integrator))
+        if (std::ranges::none_of(names, [&](const char* name) { return std::strcmp(name, parameter.id) == 0; }))
+          names.push_back(parameter.id);
+    return names;
+  }();
+  return all;
+}
 
 constexpr float kSpecial[] = {0.0f,
                               -0.0f,
@@ -227,7 +251,7 @@ class Session {
     return result;
   }
 
-  const char* word(std::initializer_list<const char*> known) {
+  const char* word(std::span<const char* const> known) {
     if (rarely(30)) return nullptr;
     if (rarely(8)) {
       const std::string text = in_.ConsumeRandomLengthString(12);
@@ -235,8 +259,9 @@ class Session {
       std::memcpy(out, text.c_str(), text.size() + 1);
       return out;
     }
-    return known.begin()[in_.ConsumeIntegralInRange<size_t>(0, known.size() - 1)];
+    return known[in_.ConsumeIntegralInRange<size_t>(0, known.size() - 1)];
   }
+  const char* word(std::initializer_list<const char*> known) { return word(std::span(known.begin(), known.size())); }
 
   // ---- Calls ----
 
@@ -398,11 +423,8 @@ class Session {
 
   lumicut_result create_integrator() {
     lumicut_integrator made = nullptr;
-    const lumicut_result result = lumicut_integrator_create(
-        handle<lumicut_device>(kDevice),
-        word({"lightcuts", "exhaustive", "illumination_cut", "wspd", "light_slice", "path_tracer",
-              "stochastic_lightcuts", "row_column_sampling", "multidimensional_lightcuts"}),
-        &made);
+    const lumicut_result result =
+        lumicut_integrator_create(handle<lumicut_device>(kDevice), word(integrator_ids()), &made);
     if (made != nullptr) {
       lumicut_integrator_set(made, "vpls", "24");
       lumicut_integrator_set(made, "samples", "1");
@@ -413,13 +435,7 @@ class Session {
   lumicut_result set_parameter() {
     const auto integrator = handle<lumicut_integrator>(kIntegrator);
     lumicut_param_info info = make<lumicut_param_info>();
-    const char* name = word({"vpls",           "seed",           "max_depth",        "error",
-                             "clamp_distance", "clamp_relative", "virtual_lights",   "sphere_scale",
-                             "compensate",     "max_cut",        "visibility",       "representatives",
-                             "columns",        "rows",           "slices",           "separation",
-                             "block",          "bright",         "local_visibility", "samples",
-                             "trees",          "direct_share",   "environment_vpls", "light_tree",
-                             "coincident",     "strong"});
+    const char* name = word(parameter_names());
     const char* value =
         word({"0",          "1",      "2",    "16",         "64",       "0.001",   "0.5",           "1e-30",
               "-1",         "nan",    "inf",  "true",       "false",    "full",    "sampling",      "spheres",
@@ -427,7 +443,7 @@ class Session {
               "divisive_6d"});
     // Numbers of lights, rows and columns that are allowed and only take long.
     if (value != nullptr && std::strtod(value, nullptr) > 1000.0) value = "1000";
-    lumicut_get_param_info(word({"lightcuts", "wspd"}), in_.ConsumeIntegral<uint32_t>(), &info);
+    lumicut_get_param_info(word(integrator_ids()), in_.ConsumeIntegral<uint32_t>(), &info);
     if (rarely()) lumicut_integrator_get(integrator, name);
     return lumicut_integrator_set(integrator, name, value);
   }
@@ -561,8 +577,8 @@ class Session {
         return lumicut_get_integrator_info(in_.ConsumeIntegralInRange<uint32_t>(0, 12),
                                            output<lumicut_integrator_info>());
       case 4:
-        return lumicut_get_param_info(word({"lightcuts", "wspd", "path_tracer"}),
-                                      in_.ConsumeIntegralInRange<uint32_t>(0, 30), output<lumicut_param_info>());
+        return lumicut_get_param_info(word(integrator_ids()), in_.ConsumeIntegralInRange<uint32_t>(0, 30),
+                                      output<lumicut_param_info>());
       case 5:
         return lumicut_get_channel_info(in_.ConsumeIntegralInRange<uint32_t>(0, 20), output<lumicut_channel_info>());
       default:

@@ -50,10 +50,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     api::Scene scene(device);
     io::upload_scene(api::linked(), scene.get(), data_of_scene);
     scene.commit();
-    static constexpr const char* kMethods[] = {
-        "exhaustive",  "lightcuts",   "illumination_cut",     "wspd",
-        "light_slice", "path_tracer", "stochastic_lightcuts", "row_column_sampling"};
-    render(device, scene, kMethods[size % std::size(kMethods)]);
+    static const auto methods = api::integrators();
+    render(device, scene, methods[size % methods.size()].id);
   } catch (const io::FileError&) {
   } catch (const api::Exception& error) {
     if (error.code() == LUMICUT_INTERNAL) fuzz::finding(error.what());

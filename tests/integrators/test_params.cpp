@@ -117,4 +117,13 @@ TEST(Registry, IdsAreUniqueAndEveryEntryTellsWhatItIs) {
   EXPECT_EQ(find_integrator("no such thing"), nullptr);
 }
 
+// Traits, files and the command's help are found by it.
+TEST(Registry, IdsAreTheNamesOfTheList) {
+  size_t i = 0;
+#define LUMICUT_INTEGRATOR(name, ...) EXPECT_STREQ(integrators()[i++].id, #name);
+#include "integrators/integrator_list.inc"
+#undef LUMICUT_INTEGRATOR
+  EXPECT_EQ(i, integrators().size());
+}
+
 }  // namespace lumicut

@@ -91,7 +91,7 @@ TEST(VplFile, ThePeersNormalsAreTurned) {
   EXPECT_EQ(lights[0].intensity[2], 6.0f);
 }
 
-TEST(VplFile, WrongFilesAreNamedWithRecordAndField) {
+TEST(VplFile, WrongLengthsAndVersionsAreNamed) {
   const TemporaryFolder folder;
   const auto error = [&](const std::string& bytes) {
     return error_of([&] { read_vpls(folder.write("bad.vpl", bytes)); });
@@ -108,21 +108,9 @@ TEST(VplFile, WrongFilesAreNamedWithRecordAndField) {
   expect_in(error(own_header(UINT64_MAX) + bytes_of(oriented(1))), {"18446744073709551615"});
   expect_in(error(own_header(1) + bytes_of(oriented(1)).substr(0, 40)), {"40 bytes"});
   expect_in(error(bytes_of(uint64_t{1} << 60) + std::string(36, '\0')), {"no VPL file"});
-  const auto light = [&](auto change) {
-    std::vector<lumicut_vpl> lights = {oriented(0), oriented(1)};
-    change(lights[1]);
-    return error(own_header(2) + bytes_of(lights[0]) + bytes_of(lights[1]));
-  };
-  expect_in(light([](auto& l) { l.position[1] = NAN; }), {"light 1", "position", "nan"});
-  expect_in(light([](auto& l) { l.intensity[0] = -1; }), {"light 1", "intensity", "-1"});
-  expect_in(light([](auto& l) { l.intensity[0] = INFINITY; }), {"light 1", "intensity", "inf"});
-  expect_in(light([](auto& l) { l.normal[1] = 0; }), {"light 1", "normal", "(0, 0, 0)"});
-  expect_in(light([](auto& l) { l.kind = 9; }), {"light 1", "kind is 9"});
-  expect_in(light([](auto& l) { l.kind = LUMICUT_VPL_SPHERE, l.cos_outer = 0; }), {"light 1", "radius is 0"});
-  expect_in(light([](auto& l) { l.spread_tan = NAN; }), {"light 1", "spot"});
 }
 
-TEST(VplFile, WrongOriginsAreNamedWithRecordAndField) {
+TEST(VplFile, RecordsWithOriginsAreCounted) {
   const TemporaryFolder folder;
   const auto error = [&](const std::string& bytes) {
     return error_of([&] { read_vpls(folder.write("bad.vpl", bytes)); });
@@ -131,18 +119,6 @@ TEST(VplFile, WrongOriginsAreNamedWithRecordAndField) {
   EXPECT_EQ(read_vpls(folder.write("good.vpl", header2(1, 1) + light + origin)).origins[0].area, 2);
   expect_in(error(header2(2, 2) + light + origin), {"bad.vpl", "says 2 lights", "76 bytes"});
   expect_in(error(header2(1, 1) + light + origin.substr(0, 8)), {"says 1 lights", "72 bytes"});
-  expect_in(error(header2(1, 0) + light + origin), {"0 samples of emitters", "1 lights"});
-  const auto spoilt = [&](auto change) {
-    lumicut_vpl_origin bad{};
-    change(bad);
-    return error(header2(2, 1) + light + origin + light + bytes_of(bad));
-  };
-  expect_in(spoilt([](auto& o) { o.source = 3; }), {"bad.vpl", "light 1", "source is 3"});
-  expect_in(spoilt([](auto& o) { o.offset = NAN; }), {"light 1", "offset is nan"});
-  expect_in(spoilt([](auto& o) { o.offset = -1; }), {"light 1", "offset is -1"});
-  expect_in(spoilt([](auto& o) { o.area = 1; }), {"light 1", "area is 1", "0 for its source"});
-  expect_in(spoilt([](auto& o) { o.source = LUMICUT_SOURCE_AREA; }), {"light 1", "area is 0", "above 0"});
-  expect_in(spoilt([](auto& o) { o.source = LUMICUT_SOURCE_AREA, o.area = INFINITY; }), {"light 1", "area is inf"});
 }
 
 TEST(VplFile, NormalsAreBroughtToLengthOne) {

@@ -6,6 +6,7 @@
 // is another, not which is right: that is what all the other tests are for.
 #include <cstring>
 #include <functional>
+#include <set>
 
 #include "full_host.h"
 #include "hwy/highway.h"
@@ -110,6 +111,16 @@ TEST_P(GoldenImages, AreUnchanged) {
     }
   }
   EXPECT_EQ(hash, GetParam().hash) << std::hex << "    0x" << hash << " now, of \"" << GetParam().name << "\"";
+}
+
+TEST(GoldenImages, AreOfEveryIntegrator) {
+  std::set<std::string> of;
+  for (const Golden& golden : kGolden) {
+    Host host;
+    golden.change(host);
+    of.insert(host.integrator);
+  }
+  for (const auto& integrator : api::integrators()) EXPECT_EQ(of.count(integrator.id), 1u) << integrator.id;
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, GoldenImages, testing::ValuesIn(kGolden),

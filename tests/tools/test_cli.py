@@ -164,8 +164,10 @@ class Render(Cli):
         self.assert_ends(result, OK)
         self.assertIn(f"{count} lights", result.stdout)
         for damaged, text in ((whole[:-1], f"says {count} lights"), (whole[:36], "header"),
-                              (whole[:40 + 64] + b"\x09" + whole[40 + 65:], "light 0: source is 9"),
-                              (whole[:32] + bytes(8) + whole[40:], "0 samples of emitters")):
+                              (whole[:40 + 64] + b"\x09" + whole[40 + 65:], "lumicut_vpl_origin[0].source"),
+                              (whole[:52] + b"\x09" + whole[53:], "lumicut_vpl[0].kind"),
+                              (whole[:72] + b"\x00\x00\xc0\x7f" + whole[76:], "lumicut_vpl[0].intensity"),
+                              (whole[:32] + bytes(8) + whole[40:], "emitter_samples")):
             bad.write_bytes(damaged)
             self.assert_ends(self.render("-i", "exhaustive", "-o", image, "--vpl-in", bad), BAD_FILE, "bad.vpl", text)
 
