@@ -85,6 +85,7 @@ struct AccelGeometry {
   std::vector<MeshView> meshes;
   std::vector<InstanceView> instances;  // empty: each mesh once, as it is
   const HitFilter* filter = nullptr;
+  uint32_t point_mask = 0xffffffffu;  // of the rays of Accel::occluded_from_point
 };
 
 struct AccelOptions {

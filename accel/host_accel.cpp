@@ -60,7 +60,7 @@ class HostAccel final : public Accel {
       const Vec3f p{px[i], py[i], pz[i]};
       rays[i].org = directional ? p : light;
       rays[i].dir = directional ? light : p - light;
-      rays[i].tfar = directional ? kInf : 0x1.fffffep-1f;
+      rays[i].tfar = directional ? kInf : 0x1.fffffep-1f, rays[i].mask = geometry_.point_mask;
     }
     HostAccel::occluded(rays);
     for (size_t i = 0; i < n; ++i) out[i] = rays[i].tfar == -kInf;

@@ -83,6 +83,19 @@ class Bsdf {
   std::optional<ScatterSample> scatter(Rng& rng) const;
   // Of a path behind the first surface that lights are sampled at: straight through glass, where shadows pass.
   PathChoice choose(Rng& rng) const;
+  // What absorbs a ray that leaves by a sample with such flags, for each unit of length; `before`: what absorbed the one that
+  // came. Glass inside glass ends the outer one's.
+  Rgb absorption_after(uint32_t flags, const Rgb& before) const {
+    if ((flags & kTransmitted) != 0) return behind_ ? Rgb{} : parameters_.absorption;
+    return behind_ ? parameters_.absorption : before;
+  }
+  // Share of light that is left after `distance` on the way to this surface: through its own glass where it is seen from
+  // inside, whatever is known of where the ray set out, else through that. [Beer, Lambert]
+  Rgb transmittance_to(float distance, const Rgb& before) const {
+    const Rgb& a = behind_ && max_component(parameters_.absorption) > 0.0f ? parameters_.absorption : before;
+    if (!(max_component(a) > 0.0f)) return {1, 1, 1};
+    return {std::exp(-a.x * distance), std::exp(-a.y * distance), std::exp(-a.z * distance)};
+  }
   // Whether some light goes straight on.
   bool passes_straight() const { return specular_ && parameters_.shadows_pass; }
 

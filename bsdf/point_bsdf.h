@@ -32,7 +32,8 @@ inline float lobe_importance(const SurfacePoint& p, float cosine, float beta) {
 }
 
 // kStraight: through glass as if it were not there; what lies behind is lit and found by shadow rays too.
-enum BsdfFlags : uint32_t { kReflected = 1, kTransmitted = 2, kSpecular = 4, kStraight = 8 };
+// kGlossy: by a lobe that virtual lights shade.
+enum BsdfFlags : uint32_t { kReflected = 1, kTransmitted = 2, kSpecular = 4, kStraight = 8, kGlossy = 16 };
 
 struct BsdfSample {
   Vec3f direction;     // unit
@@ -67,12 +68,13 @@ class PointBsdf {
   std::optional<BsdfSample> sample(float choice, float u, float v) const {
     if (black_) return {};
     BsdfSample s;
-    s.direction = choice < diffuse_share_ ? sample_cosine_hemisphere(point_.normal, u, v)
-                                          : with_lobe(point_, [&](auto lobe) { return lobe.sample(point_, u, v); });
+    const bool diffuse = choice < diffuse_share_;
+    s.direction = diffuse ? sample_cosine_hemisphere(point_.normal, u, v)
+                          : with_lobe(point_, [&](auto lobe) { return lobe.sample(point_, u, v); });
     s.pdf = pdf(s.direction);
     if (!(s.pdf > 0.0f)) return {};
     s.weight = reflectance(point_, s.direction) * (dot(point_.normal, s.direction) / s.pdf);
-    s.flags = kReflected;
+    s.flags = diffuse ? kReflected : kReflected | kGlossy;
     return s;
   }
 

@@ -146,6 +146,10 @@ struct Transform {
     const Vec3f r = cross(c1, c2) * n.x + cross(c2, c0) * n.y + cross(c0, c1) * n.z;
     return dot(c0, cross(c1, c2)) < 0.0f ? -r : r;
   }
+  // Of lengths, in the mean: the cube root of what it does to volumes.
+  float scale() const {
+    return std::cbrt(std::abs(dot(Vec3f{m[0], m[4], m[8]}, cross(Vec3f{m[1], m[5], m[9]}, Vec3f{m[2], m[6], m[10]}))));
+  }
 };
 
 }  // namespace lumicut

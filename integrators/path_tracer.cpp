@@ -74,9 +74,11 @@ class PathTracer final : public Integrator {
     float pdf = 0.0f;
     bool specular = false;  // along a specular lobe, from `origin`: nothing else finds what it finds
     Vec3f origin{};
-    uint32_t depth = 0;      // surfaces met
-    bool straight = false;   // has come so through glass to `origin`
-    float travelled = 0.0f;  // on that way, since `point`
+    uint32_t depth = 0;           // surfaces met
+    bool straight = false;        // has come so through glass to `origin`
+    float travelled = 0.0f;       // on that way, since `point`
+    uint32_t kind = kDiffuseRay;  // of its ray
+    Rgb absorption{};             // on its way, for each unit of length
   };
   struct Shadow {
     Rgb light;
@@ -97,7 +99,7 @@ class PathTracer final : public Integrator {
         Path path = paths[i];
         if (path.specular || path.straight) {
           RayHit ray;
-          ray.ray.org = path.origin, ray.ray.dir = path.direction;
+          ray.ray.org = path.origin, ray.ray.dir = path.direction, ray.ray.mask = path.kind;
           rays.push_back(ray);
           paths[alive++] = path;
           continue;
@@ -106,9 +108,9 @@ class PathTracer final : public Integrator {
         const float choice = path.rng.next_float(), u = path.rng.next_float(), v = path.rng.next_float();
         const auto s = PointBsdf(path.point).sample(choice, u, v);
         if (!s || !is_finite(s->weight)) continue;
-        path.direction = s->direction, path.weight = s->weight, path.pdf = s->pdf;
+        path.direction = s->direction, path.weight = s->weight, path.pdf = s->pdf, path.kind = ray_kind(s->flags);
         RayHit ray;
-        ray.ray.org = path.point.position, ray.ray.dir = s->direction;
+        ray.ray.org = path.point.position, ray.ray.dir = s->direction, ray.ray.mask = path.kind;
         rays.push_back(ray);
         paths[alive++] = path;
       }
@@ -157,7 +159,7 @@ class PathTracer final : public Integrator {
                   std::vector<Shadow>& shadows) const {
     if (!(max_component(value) > 0.0f) || !is_finite(value)) return;
     Ray ray;
-    ray.org = path.point.position;
+    ray.org = path.point.position, ray.mask = kShadowRay;
     if (light.kind == VplKind::directional) {
       ray.dir = -light.normal;
     } else {
@@ -186,13 +188,15 @@ class PathTracer final : public Integrator {
       return false;
     }
     const SurfaceInteraction at = scene_->interaction(hit, path.point.pixel);
+    path.weight *= at.bsdf.transmittance_to(at.t, path.absorption);
     // A ray that meets its own surface at once left it below the horizon of the triangle.
     if (!path.specular && !path.straight && at.t < 4.0f * at.offset) return false;
     if (max_component(at.emitted) > 0.0f) {
       const double cosine = std::max(1e-9f, std::abs(dot(at.geometric_normal, at.to_viewer)));
       const double distance = double{path.travelled} + at.t;
       const double density = sampler_->mesh_density(at) * distance * distance / cosine;
-      sum += path.weight * at.emitted * (path.specular ? 1.0f : power_heuristic(path.pdf, density));
+      const bool sampled_alone = !path.specular && sampler_->mesh_light(at.mesh) == LightSampler::MeshLight::by_samples;
+      if (!sampled_alone) sum += path.weight * at.emitted * (path.specular ? 1.0f : power_heuristic(path.pdf, density));
     }
     const bool last = path.depth >= max_depth_;
     if (last && !at.bsdf.passes_straight()) return false;
@@ -209,6 +213,8 @@ class PathTracer final : public Integrator {
     }
     if (choice.specular) {
       path.origin = at.bsdf.origin(choice.specular->flags), path.direction = choice.specular->direction;
+      path.kind = ray_kind(choice.specular->flags, path.kind);
+      path.absorption = at.bsdf.absorption_after(choice.specular->flags, path.absorption);
       path.weight = path.weight * choice.specular->weight / choice.probability;
       return survives(path, depth, path.weight, path.weight);
     }

@@ -35,6 +35,7 @@ struct Mesh {
   std::vector<uint32_t> materials;  // one a triangle, index into SceneData::materials
   std::vector<float> transforms;    // twelve an instance; empty: one, as it is
   uint32_t group = 0;
+  uint32_t mask = 0;  // as in lumicut_mesh
 };
 
 // Intensity of a light by direction, as lumicut_profile has it.

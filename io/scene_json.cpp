@@ -293,6 +293,10 @@ class SceneReader {
       if (!ggx) tint->fail("is of the model \"ggx\" alone");
       store(m.specular_tint, tint->vector3(1e-6, 1));
     }
+    if (auto absorption = object.find("absorption")) {
+      if (!ggx) absorption->fail("is of the model \"ggx\" alone");
+      store(m.absorption, absorption->vector3(0, 1e9) * (1.0 / scale_));
+    }
     number("shininess", m.shininess, 0, 1e6, !ggx);
     number("roughness", m.roughness, 0, 1, ggx);
     number("metallic", m.metallic, 0, 1, ggx);
@@ -400,7 +404,7 @@ class SceneReader {
     } else {
       placed.push_back(base);
     }
-    const uint32_t light_group = group(object);
+    const uint32_t light_group = group(object), mask = ray_mask(object);
     const size_t first = scene_.meshes.size();
     if (object.has("obj")) {
       read_obj_mesh(object);
@@ -414,8 +418,30 @@ class SceneReader {
       Mesh& mesh = scene_.meshes[i];
       mesh.name = name.empty() ? value.path() : name;
       mesh.group = light_group;
+      mesh.mask = mask;
       place(value, mesh, placed);
     }
+  }
+
+  // Of a mesh that some kinds of rays do not see. 0: all do.
+  static uint32_t ray_mask(JsonObject& object) {
+    static constexpr std::pair<std::string_view, uint32_t> kKinds[] = {{"camera", LUMICUT_CAMERA_RAYS},
+                                                                       {"diffuse", LUMICUT_DIFFUSE_RAYS},
+                                                                       {"glossy", LUMICUT_GLOSSY_RAYS},
+                                                                       {"transmission", LUMICUT_TRANSMISSION_RAYS},
+                                                                       {"shadow", LUMICUT_SHADOW_RAYS}};
+    const auto hidden = object.find("hidden_from");
+    if (!hidden) return 0;
+    uint32_t mask = ~uint32_t{0};
+    for (const auto& kind : hidden->elements()) {
+      const std::string name = kind.text();
+      const auto* known = std::ranges::find(kKinds, name, &std::pair<std::string_view, uint32_t>::first);
+      if (known == std::end(kKinds))
+        kind.fail(fmt::format(
+            "is \"{}\", but must be \"camera\", \"diffuse\", \"glossy\", \"transmission\" or \"shadow\"", name));
+      mask &= ~known->second;
+    }
+    return mask;
   }
 
   // One instance is baked into the vertices; more become the mesh's transforms. `unit_scale` goes into the vertices.

@@ -59,6 +59,7 @@ void upload(const Api& api, lumicut_scene scene, const SceneData& data) {
     m.transforms = mesh.transforms.empty() ? nullptr : mesh.transforms.data();
     m.transform_count = mesh.transforms.size() / 12;
     m.group = mesh.group;
+    m.mask = mesh.mask;
     uint32_t id = 0;
     check(api, api.scene_add_mesh(scene, &m, &id), fmt::format("mesh {}", mesh.name));
   }

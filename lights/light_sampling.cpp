@@ -192,7 +192,7 @@ DirectSample LightSampler::sample_light(Rng& rng) const {
   const auto weight = static_cast<float>(1.0 / share);
   const ExtendedSample extended = extended_light(e, weight, rng);
   s.vpl = extended.vpl, s.offset = extended.offset;
-  s.seen_by_rays = e.kind != Kind::sphere && e.kind != Kind::sun, s.density = share * extended.area_pdf;
+  s.seen_by_rays = found_by_rays(e), s.density = share * extended.area_pdf;
   return s;
 }
 

@@ -213,7 +213,7 @@ std::optional<NearLights::Sample> NearLights::sample(const Vec3f& position, floa
   if (!(lost > 0.0f) || !(d2 > 0.0f)) return {};
   Sample s;
   s.density = chance * place->density;
-  s.found_by_rays = shape.kind != EmitterShape::Kind::sphere;
+  s.found_by_rays = sampler_.found_by_rays(emitter);
   const Vec3f normal = shape.kind == EmitterShape::Kind::sphere ? normalize(place->at - shape.corner) : shape.normal;
   const double cosine = std::abs(static_cast<double>(dot(normal, to))) / std::sqrt(static_cast<double>(d2));
   if (!(cosine > 0.0)) return {};

@@ -20,6 +20,9 @@ struct LightPath {
   uint32_t group = 0;
   Rng rng;
   uint32_t met = 0;  // surfaces
+  Rgb absorption{};  // on its way, for each unit of length
+  uint32_t kind =
+      kDiffuseRay | kShadowRay;  // of its ray: the first one is both what a light sample meets and what is seen
 };
 
 // A VPL with the light path it came from, to keep the order of paths whatever the order of work.
@@ -44,13 +47,28 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
   std::vector<RayHit> rays;
   for (uint32_t step = 0; step < options.max_depth + kMostStraight && !paths.empty(); ++step) {
     rays.assign(paths.size(), {});
-    for (size_t i = 0; i < paths.size(); ++i) rays[i].ray.org = paths[i].origin, rays[i].ray.dir = paths[i].direction;
+    for (size_t i = 0; i < paths.size(); ++i)
+      rays[i].ray.org = paths[i].origin, rays[i].ray.dir = paths[i].direction, rays[i].ray.mask = paths[i].kind;
     scene.accel().intersect(rays);
     size_t alive = 0;
     for (size_t i = 0; i < paths.size(); ++i) {
       if (rays[i].hit.geom == kNoId) continue;
       LightPath path = paths[i];
+      const uint32_t seen_by = scene.meshes()[rays[i].hit.geom].mask;
+      if ((seen_by & kDiffuseRay) == 0) continue;  // it stops the light, and nobody sees it
       const SurfaceInteraction at = scene.interaction(rays[i]);
+      path.flux *= at.bsdf.transmittance_to(at.t, path.absorption);
+      if ((seen_by & path.kind & kShadowRay) == 0 && (path.kind & kShadowRay) != 0) {
+        // Lit, and no shadow behind it: half of the paths stay, half go on.
+        path.flux = path.flux * 2.0f;
+        if (path.rng.next_float() < 0.5f) {
+          path.origin = rays[i].ray.org + rays[i].ray.dir * at.t;
+          path.origin += dot(path.direction, at.geometric_normal) < 0.0f ? at.geometric_normal * -at.offset
+                                                                         : at.geometric_normal * at.offset;
+          paths[alive] = path, ids[alive++] = ids[i];
+          continue;
+        }
+      }
       Vpl light;
       light.position = at.position, light.kind = VplKind::oriented, light.normal = at.bsdf.normal();
       light.offset = at.offset;
@@ -62,6 +80,8 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
       const auto next = at.bsdf.scatter(path.rng);
       if (!next) continue;
       if ((next->flags & kStraight) == 0 && ++path.met >= options.max_depth) continue;
+      if ((next->flags & kStraight) == 0) path.kind = kDiffuseRay;
+      path.absorption = at.bsdf.absorption_after(next->flags, path.absorption);
       path.origin = at.bsdf.origin(next->flags), path.direction = next->direction;
       path.flux = path.flux * next->weight * next->factor;
       if (!(max_component(path.flux) > 0.0f) || !is_finite(path.flux)) continue;

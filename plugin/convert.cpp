@@ -122,6 +122,8 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   m.shadows_pass = (in.flags & LUMICUT_SHADOWS_PASS) != 0;
   c.range("specular_tint", in.specular_tint, 0.0f, 1.0f);
   if (max_component(vec(in.specular_tint)) > 0.0f) m.specular_tint = vec(in.specular_tint);
+  c.not_negative("absorption", in.absorption);
+  m.absorption = vec(in.absorption);
   m.roughness = in.roughness, m.metallic = in.metallic, m.transmission = in.transmission;
   m.ior = in.ior == 0.0f ? 1.5f : in.ior;
   m.coat = in.coat, m.coat_roughness = in.coat_roughness;

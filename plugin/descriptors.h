@@ -41,7 +41,8 @@ LUMICUT_DESCRIPTOR(lumicut_material, F(struct_size), F(flags), F(diffuse), F(shi
                    F(emission), F(diffuse_texture), F(specular_texture), F(opacity_texture), F(emission_texture),
                    F(roughness), F(metallic), F(ior), F(transmission), F(normal_texture), F(normal_strength),
                    F(height_texture), F(bump_distance), F(bump_strength), F(roughness_texture), F(metallic_texture),
-                   F(coat), F(coat_roughness), F(coat_ior), F(translucency), F(translucency_texture), F(specular_tint));
+                   F(coat), F(coat_roughness), F(coat_ior), F(translucency), F(translucency_texture), F(specular_tint),
+                   F(absorption));
 LUMICUT_DESCRIPTOR(lumicut_mesh, F(struct_size), F(mask), F(positions), F(normals), F(uvs), F(vertex_count), F(indices),
                    F(triangle_count), F(materials), F(transforms), F(transform_count), F(material), F(group));
 LUMICUT_DESCRIPTOR(lumicut_light, F(struct_size), F(type), F(unit), F(group), F(color), F(value), F(position),

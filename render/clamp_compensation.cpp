@@ -17,6 +17,7 @@ struct ClampCompensation::Search {
     float pdf = 0.0f;
     Vec3f from{};
     float travelled = 0.0f;  // from there to the ray's origin
+    Rgb absorption{};        // on the ray's way, for each unit of length
     uint32_t passages = 0;
   };
   std::vector<RayHit> rays;
@@ -53,21 +54,24 @@ void ClampCompensation::find_surface(Search& search, size_t ray, TracedPoints& h
   const SurfaceInteraction at = scene_.interaction(r, c.pixel);
   // A ray that meets its own surface at once left it below the horizon of the triangle.
   if (c.passages == 0 && at.t < 4.0f * at.offset) return;
-  const Rgb& weight = c.weight;
+  const Rgb weight = c.weight * at.bsdf.transmittance_to(at.t, c.absorption);
   const float distance = c.travelled + at.t;
   if (max_component(at.emitted) > 0.0f) {
-    const float share = nearby_ != nullptr ? nearby_->triangle_share(c.from, r.hit, distance, c.pdf)
-                                           : lost_at(search, at.position, distance);
+    const float share = (scene_.meshes()[at.mesh].mask & kDiffuseRay) == 0 ? 1.0f  // no light stands for it
+                        : nearby_ != nullptr ? nearby_->triangle_share(c.from, r.hit, distance, c.pdf)
+                                             : lost_at(search, at.position, distance);
     if (share > 0.0f) hits.add(at.emitted * weight * share, c.pixel, scene_.meshes()[at.mesh].group);
   }
   // Mirrors and glass show it what is behind them: no virtual light shines by way of those, except straight on.
-  if (auto next = start_chain(at.bsdf, weight, c.pixel, c.rng, c.passages, Passage::straight)) {
+  if (auto next =
+          start_chain(at.bsdf, weight, c.pixel, c.rng, {c.passages, Passage::straight, r.ray.mask, c.absorption})) {
     if (!next->straight) {
       search.chains.push_back(*next);
     } else if (c.passages < kMostStraight) {
       RayHit& on = search.next_rays.emplace_back();
-      on.ray.org = next->origin, on.ray.dir = next->direction;
-      search.next_carried.push_back({next->throughput, c.pixel, next->rng, c.pdf, c.from, distance, c.passages + 1});
+      on.ray.org = next->origin, on.ray.dir = next->direction, on.ray.mask = next->state.kind;
+      search.next_carried.push_back(
+          {next->throughput, c.pixel, next->rng, c.pdf, c.from, distance, next->state.absorption, c.passages + 1});
     }
   }
   if (at.bsdf.layers().empty()) return;
@@ -95,9 +99,9 @@ void ClampCompensation::trace(const ShadePoints& points, uint32_t level, const P
     const auto s = PointBsdf(point).sample(choice, u, v);
     if (!s || !is_finite(s->weight)) continue;
     RayHit ray;
-    ray.ray.org = point.position, ray.ray.dir = s->direction;
+    ray.ray.org = point.position, ray.ray.dir = s->direction, ray.ray.mask = ray_kind(s->flags);
     search.rays.push_back(ray);
-    search.carried.push_back({s->weight, point.pixel, rng, s->pdf, point.position});
+    search.carried.push_back({s->weight, point.pixel, rng, s->pdf, point.position, 0.0f, {}, 0});
   }
   while (!search.rays.empty()) {
     trace_in_parts(std::span(search.rays), progress, [&](std::span<RayHit> part) { scene_.accel().intersect(part); });

@@ -238,6 +238,7 @@ class Batch {
                                                         static_cast<float>(options_.width),
                                                         static_cast<float>(options_.height), lens.x, lens.y);
       rays[s].ray.org = c.origin, rays[s].ray.dir = c.direction, rays[s].ray.tnear = c.tnear, rays[s].ray.tfar = c.tfar;
+      rays[s].ray.mask = kCameraRay;
       cosines[s] = c.forward_cosine;
     }
   }
@@ -271,7 +272,7 @@ class Batch {
   std::optional<ChainRay> start_chain_of(const Bsdf& bsdf, size_t p, size_t sample) const {
     const auto [x, y] = pixels_[p];
     return start_chain(bsdf, {1, 1, 1}, static_cast<uint32_t>(p),
-                       Rng(hash64(options_.seed, sample), Stage::compensation, x, y));
+                       Rng(hash64(options_.seed, sample), Stage::compensation, x, y), {});
   }
 
   struct Pixel {

@@ -54,7 +54,7 @@ void NearbyLights::trace(const ShadePoints& points, const Options& options, cons
         light *= power_heuristic(kSamples * s->density, bsdf.pdf(normalize(to_light)));
       Ray ray;  // ends before a mesh, which blocks
       ray.org = point.position, ray.dir = to_light + s->vpl.normal * s->offset;
-      ray.tnear = 0.0f, ray.tfar = 1.0f;
+      ray.tnear = 0.0f, ray.tfar = 1.0f, ray.mask = kShadowRay;
       waiting.shadows.push_back(ray), waiting.light.push_back(light);
       waiting.pixel.push_back(options.by_point ? static_cast<uint32_t>(i) : point.pixel);
       waiting.group.push_back(s->vpl.group);
@@ -73,6 +73,7 @@ float NearbyLights::light_share(const Vec3f& origin, uint32_t light, float dista
 }
 
 float NearbyLights::triangle_share(const Vec3f& origin, const Hit& hit, float distance, float pdf) const {
+  if ((scene_.meshes()[hit.geom].mask & kGlossyRay) == 0) return 0.0f;  // lights are sampled as if no ray found it
   const NearLights::Found f = near_.find_triangle(origin, hit.geom, hit.prim, scene_.instance_of(hit), distance);
   return f.lost > 0.0f ? f.lost * power_heuristic(pdf, kSamples * f.density) : 0.0f;
 }

@@ -8,17 +8,23 @@ constexpr uint32_t kSureBounces = 4;
 constexpr float kSureWeight = 0.25f;  // a smooth coat shows less, and would double the points to shade
 }  // namespace
 
-std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uint32_t pixel, Rng rng, uint32_t bounces,
-                                    Passage passage) {
+std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uint32_t pixel, Rng rng,
+                                    const ChainRay::State& state) {
   const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float(), luck = rng.next_float();
-  const auto s = bsdf.sample_specular(choice, u, v, passage);
+  const auto s = bsdf.sample_specular(choice, u, v, state.passage);
   if (!s) return {};
   const Rgb weight = throughput * s->weight;
   const float carried = max_component(weight);
-  const float survive = bounces < kSureBounces && carried >= kSureWeight ? 1.0f : std::min(1.0f, carried);
+  const float survive = state.bounces < kSureBounces && carried >= kSureWeight ? 1.0f : std::min(1.0f, carried);
   if (!(luck < survive)) return {};
-  return ChainRay{bsdf.origin(s->flags), s->direction, weight / survive,           pixel, rng,
-                  bounces + 1,           passage,      (s->flags & kStraight) != 0};
+  return ChainRay{bsdf.origin(s->flags),
+                  s->direction,
+                  weight / survive,
+                  pixel,
+                  rng,
+                  {state.bounces + 1, state.passage, ray_kind(s->flags, state.kind),
+                   bsdf.absorption_after(s->flags, state.absorption)},
+                  (s->flags & kStraight) != 0};
 }
 
 void follow_chains(const Scene& scene, const LightSurfaces& light_surfaces, std::vector<ChainRay> chains,
@@ -27,13 +33,14 @@ void follow_chains(const Scene& scene, const LightSurfaces& light_surfaces, std:
   for (uint32_t depth = 0; depth < kMaxSurfaces && !chains.empty(); ++depth) {
     rays.assign(chains.size(), {});
     for (size_t i = 0; i < chains.size(); ++i)
-      rays[i].ray.org = chains[i].origin, rays[i].ray.dir = chains[i].direction;
+      rays[i].ray.org = chains[i].origin, rays[i].ray.dir = chains[i].direction,
+      rays[i].ray.mask = chains[i].state.kind;
     trace_in_parts(std::span(rays), progress, [&](std::span<RayHit> part) { scene.accel().intersect(part); });
     counters.rays += rays.size();
     std::vector<ChainRay> next;
     for (size_t i = 0; i < chains.size(); ++i) {
       if (i % 4096 == 0) progress.check();
-      const ChainRay& chain = chains[i];
+      ChainRay& chain = chains[i];
       if (!light_surfaces.empty())
         light_surfaces.for_each_hit(
             chain.origin, chain.direction, rays[i].ray.tfar, [&](const LightSurfaces::Hit& seen) {
@@ -45,14 +52,14 @@ void follow_chains(const Scene& scene, const LightSurfaces& light_surfaces, std:
         continue;
       }
       const SurfaceInteraction at = scene.interaction(rays[i], chain.pixel);
+      chain.throughput *= at.bsdf.transmittance_to(at.t, chain.state.absorption);
       const Rgb light = chain.throughput * at.emitted;
       if (max_component(light) > 0.0f) hits.add(light, chain.pixel, scene.meshes()[at.mesh].group);
       for (SurfacePoint point : at.bsdf.layers()) {
         point.attenuate(chain.throughput);
         if (!PointBsdf(point).black()) hits.found.push_back(point);
       }
-      if (auto ray = start_chain(at.bsdf, chain.throughput, chain.pixel, chain.rng, chain.bounces, chain.passage))
-        next.push_back(*ray);
+      if (auto ray = start_chain(at.bsdf, chain.throughput, chain.pixel, chain.rng, chain.state)) next.push_back(*ray);
     }
     chains = std::move(next);
   }

@@ -13,15 +13,22 @@ struct ChainRay {
   Rgb throughput{};
   uint32_t pixel = 0;
   Rng rng;
-  uint32_t bounces = 0;  // specular ones before
-  Passage passage = Passage::refracted;
+  // What is handed on from surface to surface.
+  struct State {
+    uint32_t bounces = 0;  // specular ones before
+    Passage passage = Passage::refracted;
+    uint32_t kind = kCameraRay;  // RayKind
+    Rgb absorption{};            // on its way, for each unit of length
+  };
+  State state;
   bool straight = false;  // it has just gone so
 };
 
 // The ray that goes on from a surface with a specular lobe; `throughput`: of what the surface shows. The first bounces
 // off mirrors and through glass are sure: a mirror is not peppered black. Chance keeps the others by what they carry.
+// `state`: of the ray that came.
 std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uint32_t pixel, Rng rng,
-                                    uint32_t bounces = 0, Passage passage = Passage::refracted);
+                                    const ChainRay::State& state);
 
 // Follows the rays to their ends. Lights with an area are seen in mirrors, though not by the camera itself.
 void follow_chains(const Scene& scene, const LightSurfaces& light_surfaces, std::vector<ChainRay> rays,

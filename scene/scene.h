@@ -14,6 +14,7 @@
 #include "scene/light.h"
 #include "scene/light_profile.h"
 #include "scene/material.h"
+#include "scene/ray_kind.h"
 #include "scene/scene_extent.h"
 #include "scene/surface_interaction.h"
 #include "scene/texture.h"
@@ -28,7 +29,7 @@ struct Mesh {
   std::vector<uint32_t> triangle_materials;  // empty: `material` for all
   std::vector<Transform> instances;          // empty: one, as it is
   uint32_t material = 0;
-  uint32_t mask = 0xffffffffu;
+  uint32_t mask = 0xffffffffu;  // RayKind: of the rays that see it
   uint32_t group = 0;
   LUMICUT_FIELDS(Mesh, positions, normals, uvs, indices, triangle_materials, instances, material, mask, group)
 
@@ -78,8 +79,8 @@ class Scene final : private HitFilter {
   template <typename Visit>
   void for_each_part(Visit&& visit) const {
     const auto& [config, textures, materials, glass, most_layers, meshes, lights, profiles, environment, camera,
-                 has_camera, trace, accel, first_instance, instanced, committed, version, bounds, radius, extent] =
-        *this;
+                 has_camera, trace, accel, first_instance, thickness, instanced, committed, version, bounds, radius,
+                 extent] = *this;
     const bool host_trace = trace != nullptr;
     visit("accel", config);
     visit("host_trace", host_trace);
@@ -171,6 +172,7 @@ class Scene final : private HitFilter {
   AccelFactory trace_;
   std::unique_ptr<Accel> accel_;
   std::vector<uint32_t> first_instance_;  // of each mesh, in AccelGeometry::instances
+  std::vector<float> thickness_;          // of each mesh whose glass absorbs what goes straight through it, else 0
   bool instanced_ = false;
   bool committed_ = false;
   uint64_t version_ = 0;

@@ -110,7 +110,7 @@ class BundleTracer {
       r.org = {bundle_.origin[0][i], bundle_.origin[1][i], bundle_.origin[2][i]}, r.dir = bundle_.common;
     else
       r.org = bundle_.common, r.dir = {bundle_.dir[0][i], bundle_.dir[1][i], bundle_.dir[2][i]};
-    r.tfar = bundle_.tfar;
+    r.tfar = bundle_.tfar, r.mask = scene_.point_mask;
     return r;
   }
 
@@ -202,8 +202,12 @@ class BundleTracer {
       }
       return stopped;
     }
-    return C::kRobust ? bundle_triangles_robust(block, bundle_, max_dir_, rays)
-                      : bundle_triangles_fast(block, bundle_, rays);
+    uint32_t unseen = 0;  // lanes
+    if constexpr (C::kMasks)
+      for (int lane = 0; lane < 4 && block.prim[lane] != kNoId; ++lane)
+        if ((scene_.mesh_masks[block.geom[lane]] & scene_.point_mask) == 0) unseen |= 1u << lane;
+    return C::kRobust ? bundle_triangles_robust<C::kMasks>(block, bundle_, max_dir_, rays, unseen)
+                      : bundle_triangles_fast<C::kMasks>(block, bundle_, rays, unseen);
   }
   // One ray against a block.
   HWY_INLINE bool stops(const LeafBlock& block, const Ray& r) const {

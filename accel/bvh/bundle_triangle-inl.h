@@ -29,9 +29,11 @@ HWY_INLINE VN dot_dir(const float (*row)[4], int lane, const VN* dir) {
                     hn::MulAdd(hn::Set(d, row[0][lane]), dir[0], hn::Mul(hn::Set(d, row[1][lane]), dir[1])));
 }
 
-// Rays that test_lane(lane, directions) reports, for each triangle and each vector of rays not yet stopped.
-template <class Test>
-HWY_INLINE uint64_t stopped_rays(const LeafBlock& block, const Bundle& bundle, uint64_t rays, const Test& test_lane) {
+// Rays that test_lane(lane, directions) reports, for each triangle and each vector of rays not yet stopped. `unseen`: a
+// bit per triangle to leave out, of scenes with masks.
+template <bool masks, class Test>
+HWY_INLINE uint64_t stopped_rays(const LeafBlock& block, const Bundle& bundle, uint64_t rays, uint32_t unseen,
+                                 const Test& test_lane) {
   const DN d;
   constexpr size_t kLanes = hn::MaxLanes(DN());
   const uint64_t lanes_mask = (uint64_t{1} << kLanes) - 1;
@@ -41,6 +43,7 @@ HWY_INLINE uint64_t stopped_rays(const LeafBlock& block, const Bundle& bundle, u
     if (wanted == 0) continue;
     const VN dir[3] = {hn::Load(d, bundle.dir[0] + i), hn::Load(d, bundle.dir[1] + i), hn::Load(d, bundle.dir[2] + i)};
     for (int lane = 0; lane < 4 && block.prim[lane] != kNoId; ++lane) {
+      if (masks && (unseen >> lane & 1) != 0) continue;
       const uint64_t hit = static_cast<uint64_t>(bits_of(d, test_lane(lane, dir))) & wanted;
       stopped |= hit << i;
       wanted &= ~hit;
@@ -52,7 +55,9 @@ HWY_INLINE uint64_t stopped_rays(const LeafBlock& block, const Bundle& bundle, u
 
 // Möller and Trumbore with s = o - v0: det = d·(e2×e1), u = d·(e2×s), v = d·(s×e1), t = e2·(s×e1). Only d differs
 // between rays.
-HWY_INLINE uint64_t bundle_triangles_fast(const LeafBlock& block, const Bundle& bundle, uint64_t rays) {
+template <bool masks>
+HWY_INLINE uint64_t bundle_triangles_fast(const LeafBlock& block, const Bundle& bundle, uint64_t rays,
+                                          uint32_t unseen) {
   const D4 d4;
   SharedRows rows;
   for (size_t i = 0; i < 4; i += hn::Lanes(d4)) {
@@ -65,7 +70,7 @@ HWY_INLINE uint64_t bundle_triangles_fast(const LeafBlock& block, const Bundle& 
     store(p, rows.u, i), store(q, rows.v, i), store(n, rows.n, i);
     hn::Store(dot4(e2, q), d4, rows.t + i);
   }
-  return stopped_rays(block, bundle, rays, [&](int lane, const VN* dir) HWY_ATTR {
+  return stopped_rays<masks>(block, bundle, rays, unseen, [&](int lane, const VN* dir) HWY_ATTR {
     const DN d;
     const VN det = dot_dir(rows.n, lane, dir), sign = hn::And(det, hn::SignBit(d)), abs_det = hn::Xor(det, sign),
              zero = hn::Zero(d);
@@ -77,8 +82,9 @@ HWY_INLINE uint64_t bundle_triangles_fast(const LeafBlock& block, const Bundle& 
 }
 
 // Plücker edge tests. `max_dir`: the greatest absolute component of an active direction; scales the error bounds.
-HWY_INLINE uint64_t bundle_triangles_robust(const LeafBlock& block, const Bundle& bundle, float max_dir,
-                                            uint64_t rays) {
+template <bool masks>
+HWY_INLINE uint64_t bundle_triangles_robust(const LeafBlock& block, const Bundle& bundle, float max_dir, uint64_t rays,
+                                            uint32_t unseen) {
   const D4 d4;
   SharedRows rows;
   for (size_t i = 0; i < 4; i += hn::Lanes(d4)) {
@@ -98,7 +104,7 @@ HWY_INLINE uint64_t bundle_triangles_robust(const LeafBlock& block, const Bundle
     hn::Store(hn::Mul(edge_reach(block, i, a), hn::Set(d4, kEdgeSlack * max_dir)), d4, rows.slack + i);
     hn::Store(hn::Mul(norm1(row), hn::Set(d4, kEdgeOn * max_dir)), d4, rows.edge_on + i);
   }
-  return stopped_rays(block, bundle, rays, [&](int lane, const VN* dir) HWY_ATTR {
+  return stopped_rays<masks>(block, bundle, rays, unseen, [&](int lane, const VN* dir) HWY_ATTR {
     const DN d;
     const VN u = dot_dir(rows.u, lane, dir), v = dot_dir(rows.v, lane, dir), w = dot_dir(rows.w, lane, dir);
     const VN slack = hn::Set(d, rows.slack[lane]);

@@ -24,6 +24,7 @@ struct TraceScene {
   const HitFilter* filter = nullptr;
   const uint8_t* filtered = nullptr;     // by mesh: FilteredRays
   const uint32_t* mesh_masks = nullptr;  // by mesh
+  uint32_t point_mask = 0xffffffffu;     // of the rays of trace_points
   bool robust = true;
   bool boxes = false;  // leaves hold boxes, not triangles
   bool masks = false;  // some mesh mask is not all ones

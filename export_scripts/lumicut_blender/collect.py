@@ -14,7 +14,6 @@ from .report import Report
 from .scene_data import Mesh, SceneData, flattened, is_flat
 
 AS_MESH = {"CURVE", "FONT", "META", "SURFACE"}  # a MESH item follows for each
-RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
 LEFT_OUT = {"VOLUME": "Volumes left out", "CURVES": "Hair and curve objects left out",
             "POINTCLOUD": "Point clouds left out", "GPENCIL": "Grease pencil left out",
             "GREASEPENCIL": "Grease pencil left out"}
@@ -282,20 +281,31 @@ class Collector:
             slots = [override]
         else:
             slots = [slot.material for slot in ob.material_slots] or [None]
-        numbers = [self.materials.number(material, lambda: self._is_pane(mesh, instance.matrix_world)) for material in slots]
+        of_slots = [self.materials.numbers(material, lambda: self._is_pane(mesh, instance.matrix_world)) for material in slots]
+        if ob.as_pointer() not in self._looked_at:
+            self._looked_at.add(ob.as_pointer())
+            self._check_flags(ob)
+        # A mesh for each set of materials that some kinds of rays see alike.
+        masks = {}
+        hidden = self._hidden_from(ob)
+        for (ray, bit), numbers in zip(library.RAYS.items(), zip(*of_slots)):
+            if ray not in hidden:
+                masks[numbers] = masks.get(numbers, 0) | bit
+        for numbers, mask in masks.items():
+            self._add_variant(instance, ob, mesh, slots, numbers, 0 if mask == library.ALL_RAYS else mask)
+
+    def _add_variant(self, instance, ob, mesh, slots, numbers, mask):
+        """`numbers`: materials by slot; `mask`: of the rays that see them."""
         group = self._group(ob) if any(any(self.materials.converted[n].values.emission) for n in numbers) else 0
-        key = (mesh.as_pointer(), tuple(numbers), group)
+        key = (mesh.as_pointer(), numbers, group, mask)
         if key not in self._meshes:
             self.check()
             found = self._read(ob, mesh, slots, numbers)
             if found is not None:
-                found.group = group
+                found.group, found.mask = group, mask
                 if all(self.materials.converted[n].is_hole() for n in found.numbers()):
                     found = None
             self._meshes[key] = found
-        if ob.as_pointer() not in self._looked_at:
-            self._looked_at.add(ob.as_pointer())
-            self._check_flags(ob)
         target = self._meshes[key]
         if target is not None:
             transform = rows(instance.matrix_world)
@@ -319,16 +329,19 @@ class Collector:
         thickness, width, _ = sorted(extents * np.abs(matrix.to_scale()))
         return is_open or thickness <= 0.1 * width
 
+    def _hidden_from(self, ob):
+        """Kinds of rays that do not see an object: its own setting, and its collection's Indirect Only."""
+        hidden = {ray for ray in library.RAYS if not getattr(ob, "visible_" + ray)}
+        if ob.indirect_only_get(view_layer=self.depsgraph.view_layer_eval):
+            hidden.add("camera")
+        return hidden
+
     def _check_flags(self, ob):
         layer = self.depsgraph.view_layer_eval
         if ob.is_holdout or ob.holdout_get(view_layer=layer):  # its own, or its collection's
             self.report.note(ob.name, "Holdouts taken as ordinary objects")
-        if ob.indirect_only_get(view_layer=layer):
-            self.report.note(ob.name, "Objects of Indirect Only collections, which the camera sees here")
         if ob.is_shadow_catcher:
             self.report.note(ob.name, "Shadow catchers taken as ordinary objects")
-        if not all(getattr(ob, "visible_" + ray) for ray in RAYS):
-            self.report.note(ob.name, "Objects hidden from some rays, which all see here")
 
     def _read(self, ob, mesh, slots, numbers):
         if self.cache is None:

@@ -170,6 +170,8 @@ class Writer:
                 out["shadows_pass"] = True
             if any(m.specular_tint):
                 out["specular_tint"] = numbers(m.specular_tint)
+            if any(m.absorption):
+                out["absorption"] = numbers(m.absorption)
             for key in ("roughness", "metallic", "ior", "transmission"):
                 out[key] = numbers([getattr(m, key)])[0]
             if m.coat > 0:
@@ -286,7 +288,8 @@ class Writer:
             self.write(file, obj(mesh, mtl, names))
             out["meshes"].append({"name": mesh.name, "obj": file, "materials": {n: n for n in names},
                                   "instances": [numbers(t) for t in mesh.transforms],
-                                  **({"group": mesh.group} if mesh.group else {})})
+                                  **({"group": mesh.group} if mesh.group else {}),
+                                  **({"hidden_from": [ray for ray, bit in library.RAYS.items() if not mesh.mask & bit]} if mesh.mask else {})})
         if not out["meshes"]:
             raise ExportError("the scene has no mesh to export")
         return out

@@ -26,6 +26,9 @@ EMIT_BOTH_SIDES, PHONG, GGX, NO_FRESNEL, BURLEY, SHADOWS_PASS = 1, 2, 4, 8, 16, 
 POINT, SPOT, RECTANGLE, DISK, SUN = range(5)
 RADIOMETRIC, WATT = 0, 1
 HIDDEN = 1  # of Environment.flags
+CAMERA_RAYS, DIFFUSE_RAYS, GLOSSY_RAYS, TRANSMISSION_RAYS, SHADOW_RAYS = 1, 2, 4, 8, 16  # of Mesh.mask
+RAYS = {"camera": CAMERA_RAYS, "diffuse": DIFFUSE_RAYS, "glossy": GLOSSY_RAYS, "transmission": TRANSMISSION_RAYS, "shadow": SHADOW_RAYS}
+ALL_RAYS = sum(RAYS.values())
 CHECKPOINTS, ILLUMINANCE, GROUPS = 1, 2, 4  # of RenderDesc.flags
 VIRTUAL_LIGHTS, LIGHT_GROUPS, COMPENSATION, SAVED_STATE, VIEW_INDEPENDENT, ALL_LIGHTS = 1, 2, 4, 8, 16, 32  # traits
 VPL_OMNI, VPL_ORIENTED, VPL_DIRECTIONAL, VPL_SPOT, VPL_SPHERE = range(5)
@@ -141,7 +144,8 @@ class Material(Descriptor):
                 ("height_texture", c_int32), ("bump_distance", c_float), ("bump_strength", c_float),
                 ("roughness_texture", c_int32), ("metallic_texture", c_int32), ("coat", c_float),
                 ("coat_roughness", c_float), ("coat_ior", c_float), ("translucency", c_float * 3),
-                ("translucency_texture", c_int32), ("specular_tint", c_float * 3)]
+                ("translucency_texture", c_int32), ("specular_tint", c_float * 3),
+                ("absorption", c_float * 3)]
 
 
 class Mesh(Descriptor):
@@ -206,7 +210,7 @@ class ChannelInfo(Descriptor):
 
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
 SIZES = {Ray: 48, Hit: 32, Rayhit: 80, Vpl: 64, Point: 64, DeviceDesc: 32, Status: 64, AccelDesc: 80, AccelInfo: 80,
-         AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 32, Material: 152, Mesh: 88, Light: 116, Profile: 40,
+         AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 32, Material: 164, Mesh: 88, Light: 116, Profile: 40,
          Environment: 64, Camera: 92, IntegratorInfo: 88, ParamInfo: 72, RenderDesc: 72, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32
@@ -460,7 +464,7 @@ class Scene(Handle):
                 raise Error(INVALID_ARGUMENT, f"profile: {w.size} values for {v.size} x {h.size} angles")
         self._call("scene_set_profiles", *_array(Profile, items))
 
-    def add_mesh(self, positions, indices, normals=None, uvs=None, materials=None, material=0, transforms=None, group=0):
+    def add_mesh(self, positions, indices, normals=None, uvs=None, materials=None, material=0, transforms=None, group=0, mask=0):
         positions, normals, uvs = _rows(positions, np.float32, 3), _rows(normals, np.float32, 3), _rows(uvs, np.float32, 2)
         indices, materials = _rows(indices, np.uint32, 3), _rows(materials, np.uint32, 1)
         transforms = _rows(transforms, np.float32, 12)
@@ -476,7 +480,7 @@ class Scene(Handle):
         mesh = Mesh(positions=address(positions), normals=address(normals), uvs=address(uvs),
                     vertex_count=len(positions), indices=address(indices), triangle_count=len(indices),
                     materials=address(materials), material=material, transforms=address(transforms),
-                    transform_count=0 if transforms is None else len(transforms), group=group)
+                    transform_count=0 if transforms is None else len(transforms), group=group, mask=mask)
         self._call("scene_add_mesh", ctypes.byref(mesh), ctypes.byref(c_uint32()))
 
     def set_environment(self, environment):

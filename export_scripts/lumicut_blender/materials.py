@@ -10,7 +10,7 @@ import math
 import bpy
 import numpy as np
 
-from . import library
+from . import library, volumes
 from .images import Images, Picture, image_of
 from .mappings import Mapping, aligned
 from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Value, input_of
@@ -103,6 +103,7 @@ class Surface:
     clearcoat: ClearCoat = None
     burley: bool = False  # the diffuse part, of which coats take nothing
     tint: tuple = None    # of metal's edge, of what glass reflects
+    absorption: tuple = None  # inside glass, 1/length
 
 
 def cut_of(factor, picture):
@@ -120,6 +121,7 @@ def luminance(value):
 class SurfaceReader(Evaluator):
     """Closures of one material's tree, added up."""
 
+    all_rays = True
     normals = None  # (picture, strength)
     heights = None  # (picture, distance, strength)
 
@@ -181,7 +183,7 @@ class SurfaceReader(Evaluator):
     def closure_mix_shader(self, node, stack):
         a, b = self.surface(node.inputs[1], stack), self.surface(node.inputs[2], stack)
         shadows_pass = a.clear != b.clear and luminance((b if a.clear else a).glass) > 0 and self.clear_to_shadows(node, stack, a.clear)
-        f = self.value_for("Is Camera Ray", node.inputs[0], stack) if shadows_pass else self.value(node.inputs[0], stack)
+        f = self.value_for("camera", node.inputs[0], stack) if shadows_pass else self.value(node.inputs[0], stack)
         if f.picture is None:
             f = Value(np.clip(f.factor, 0, 1))
         rest = self.complement(f)
@@ -197,7 +199,7 @@ class SurfaceReader(Evaluator):
         def share(ray):
             f = min(1.0, max(0.0, self.value_for(ray, node.inputs[0], stack).scalar()))
             return 1 - f if first else f
-        return share("Is Shadow Ray") - share("Is Camera Ray") > 0.5
+        return share("shadow") - share("camera") > 0.5
 
     def closure_add_shader(self, node, stack):
         a, b = self.surface(node.inputs[0], stack), self.surface(node.inputs[1], stack)
@@ -437,6 +439,10 @@ class Converted:
         """Whether no ray meets it."""
         return self.values.opacity < 2 * HOLE and "opacity" not in self.pictures and not any(self.values.emission)
 
+    def is_same(self, other):
+        return (bytes(self.values), self.mapping, {slot: p.key for slot, p in self.pictures.items()}) == \
+            (bytes(other.values), other.mapping, {slot: p.key for slot, p in other.pictures.items()})
+
 
 COARSE = "Textures that repeat much against others of their material, at a lower resolution"
 SLOTS = ("diffuse", "specular", "translucency", "emission", "opacity")
@@ -450,14 +456,27 @@ class Materials:
         self.images = images or Images(report, check)
         self.converted, self.pictures = [], []
         self._numbers, self._picture_numbers = {}, {}
+        self._by_ray = set()  # names of materials that Light Path parts
 
-    def number(self, material, pane=lambda: False):
-        """Index of a Blender material (None: the default grey) on a mesh; `pane`: whether that is a sheet or flat, asked of
-        glass alone. Light goes straight through panes; bodies bend it."""
+    def numbers(self, material, pane=lambda: False):
+        """Index of a Blender material for each kind of ray, in the order of library.RAYS; see number()."""
+        first = self.number(material, pane)
+        if material is None or material.name_full not in self._by_ray:
+            return (first,) * len(library.RAYS)
+        return (first, *(self.number(material, pane, ray) for ray in list(library.RAYS)[1:]))
+
+    def number(self, material, pane=lambda: False, ray="camera"):
+        """Index of a Blender material (None: the default grey) on a mesh, as a kind of ray sees it; `pane`: whether that is
+        a sheet or flat, asked of glass alone. Light goes straight through panes; bodies bend it."""
         key = None if material is None else material.name_full
+        if ray != "camera":
+            key = (key, ray)
         if key not in self._numbers:
-            self._numbers[key] = len(self.converted)
-            self.converted.append(self._convert(material))
+            converted = self._convert(material, ray)
+            same = ray != "camera" and self.converted[self._numbers[key[0]]].is_same(converted)
+            self._numbers[key] = self._numbers[key[0]] if same else len(self.converted)
+            if not same:
+                self.converted.append(converted)
         number = self._numbers[key]
         values = self.converted[number].values
         if values.transmission <= 0 or values.flags & library.SHADOWS_PASS:
@@ -486,9 +505,9 @@ class Materials:
     def image_items(self):
         return [image_of(picture) for picture in self.pictures]
 
-    def _convert(self, material):
+    def _convert(self, material, ray):
         name = "default" if material is None else material.name
-        surface, normals, heights = self._surface(material, name)
+        surface, normals, heights = self._surface(material, name, ray)
         m = library.Material(opacity=1.0)
         pictures = {}
         factors = {}
@@ -593,6 +612,8 @@ class Materials:
         whole = d + metal + glass
         m.metallic = metal / whole if whole > 0 else 0.0
         m.transmission = glass / (d + glass) if d + glass > 0 else 0.0
+        if surface.absorption is not None and m.transmission > 0:
+            m.absorption[:] = surface.absorption
         if surface.shadows_pass and m.transmission > 0:
             m.flags |= library.SHADOWS_PASS
         opaque = (1 - m.metallic) * (1 - m.transmission)
@@ -627,21 +648,28 @@ class Materials:
         grey = (picture.linear() @ LUMINANCE)[..., None]
         return Picture(picture.name + " mask", (picture.key, "mask"), picture.mapping, picture.flags, linear=grey)
 
-    def _surface(self, material, name):
+    def _surface(self, material, name, ray):
         if material is None:
             return Surface(diffuse=Value(0.8)), None, None
         if not material.use_nodes or material.node_tree is None:
             return Surface(diffuse=Value(list(material.diffuse_color)[:3])), None, None
         reader = SurfaceReader(name, self.images, self.report)
+        reader.ray = ray
         tree = material.node_tree
         output = tree.get_output_node("CYCLES") or tree.get_output_node("ALL")
         if output is None:
             return Surface(), None, None
-        for socket in ("Volume", "Displacement"):
-            if output.inputs[socket].is_linked:
-                reader.note("", f"{socket}s left out" if socket == "Volume" else "Displacement left out")
+        if output.inputs["Displacement"].is_linked:
+            reader.note("", "Displacement left out")
         # Outputs inside a group cannot be: the output stands in the tree itself.
         surface = reader.surface(output.inputs["Surface"])
-        if output.inputs["Volume"].is_linked and not output.inputs["Surface"].is_linked:
-            surface = Surface(opacity=ZERO, clear=True)  # no surface: rays pass
+        if reader.by_ray:
+            self._by_ray.add(material.name_full)
+        if output.inputs["Volume"].is_linked:
+            if not output.inputs["Surface"].is_linked:
+                surface = Surface(opacity=ZERO, clear=True)  # no surface: rays pass
+            if luminance(surface.glass) > 0:
+                surface = dataclasses.replace(surface, absorption=tuple(volumes.absorption(reader, output.inputs["Volume"])))
+            else:
+                reader.note("", "Volumes left out")
         return surface, reader.normals, reader.heights

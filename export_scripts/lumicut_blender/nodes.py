@@ -138,10 +138,23 @@ def blackbody(kelvin):
                                    0.0556434 * big_x - 0.2040259 + 1.0572252 * big_z]))
 
 
+# Outputs of Light Path that are 1. Depths are those of the first ray of a kind.
+LIGHT_PATH = {
+    "camera": {"Is Camera Ray"},
+    "diffuse": {"Is Diffuse Ray", "Is Reflection Ray", "Ray Depth", "Diffuse Depth"},
+    "glossy": {"Is Glossy Ray", "Is Reflection Ray", "Ray Depth", "Glossy Depth"},
+    "transmission": {"Is Transmission Ray", "Ray Depth", "Transmission Depth"},
+    "shadow": {"Is Shadow Ray", "Ray Depth"},
+}
+LIGHT_PATH["known"] = {"Transparent Depth"}.union(*LIGHT_PATH.values())
+
+
 class Evaluator:
     """Follows the sockets of one material, light or world. `owner` is the name that notes carry."""
 
-    ray = None  # the output of Light Path that says yes; None: the camera's, with a note
+    ray = "camera"      # the kind of ray, of library.RAYS, that Light Path tells
+    by_ray = False      # whether it was asked
+    all_rays = False    # whether the owner asks for all kinds
 
     def __init__(self, owner, images, report):
         self.owner, self.images, self.report = owner, images, report
@@ -330,7 +343,7 @@ class Evaluator:
         return self._unknown(node, output, stack)
 
     def value_for(self, ray, socket, stack):
-        """As one kind of ray has it: an output of Light Path such as "Is Shadow Ray"."""
+        """As one kind of ray has it."""
         self.ray, before = ray, self.ray
         try:
             return self.value(socket, stack)
@@ -338,10 +351,12 @@ class Evaluator:
             self.ray = before
 
     def _light_path(self, node, output, stack):
-        if self.ray is not None:
-            return Value(1.0 if output.name == self.ray else 0.0)
-        self.note("Light Path", "Nodes that depend on the ray, taken as for the camera's")
-        return Value(1.0 if output.name == "Is Camera Ray" else 0.0)
+        self.by_ray = True
+        if not self.all_rays:
+            self.note("Light Path", "Nodes that depend on the ray, taken as for the camera's")
+        elif output.name not in LIGHT_PATH["known"]:
+            self.note(f"Light Path: {output.name}", "Numbers of a ray's path taken as 0")
+        return Value(1.0 if output.name in LIGHT_PATH[self.ray] else 0.0)
 
     def _gamma(self, node, output, stack):
         colour, gamma = self.value(node.inputs[0], stack), self.value(node.inputs[1], stack)

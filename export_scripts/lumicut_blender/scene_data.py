@@ -26,6 +26,7 @@ class Mesh:
     material: int = 0
     transforms: list = dataclasses.field(default_factory=list)  # 3x4 each, one an instance
     group: int = 0                       # light group of what it emits
+    mask: int = 0                        # library.RAYS that see it; 0: all
 
     def numbers(self):
         """Of all materials in use."""
@@ -113,10 +114,11 @@ class SceneData:
             if len(mesh.transforms) == 1:
                 positions, normals, indices = baked(mesh, check)
                 check()
-                scene.add_mesh(positions, indices, normals, mesh.uvs, mesh.materials, mesh.material, group=mesh.group)
+                scene.add_mesh(positions, indices, normals, mesh.uvs, mesh.materials, mesh.material, group=mesh.group,
+                               mask=mesh.mask)
             else:
                 scene.add_mesh(mesh.positions, mesh.indices, mesh.normals, mesh.uvs, mesh.materials, mesh.material,
-                               np.array(mesh.transforms, np.float32), mesh.group)
+                               np.array(mesh.transforms, np.float32), mesh.group, mesh.mask)
         scene.set_profiles([(p.vertical, p.horizontal, p.values) for p in self.profiles])
         scene.set_lights([light for _, light in self.lights])
         scene.set_environment(self.environment)

@@ -2,6 +2,7 @@
 #include "core/parallel.h"
 #include "integrators/wspd/wspd_tree.h"
 #include "lights/falloff.h"
+#include "scene/ray_kind.h"
 
 namespace lumicut {
 
@@ -184,7 +185,7 @@ void WspdTree::find_cubemaps(const Options& options, Progress& progress) {
           const float t = -b + std::sqrt(std::max(0.0f, b * b - length2(from) + node.radius * node.radius));
           if (!(t > 0.0f)) continue;
           Ray r;
-          r.org = v.position, r.dir = d, r.tfar = t;
+          r.org = v.position, r.dir = d, r.tfar = t, r.mask = kShadowRay;
           rays.push_back(r);
           samples.push_back({cell, weight});
         }

@@ -334,7 +334,7 @@ __attribute__((noinline)) void fill_stack(uint8_t value) {
 }
 
 // Bundles of 1 to 333 points around each other, to a light or a sun, against single rays.
-void expect_bundles_agree_with_single_rays(const Accel& accel, uint64_t seed) {
+void expect_bundles_agree_with_single_rays(const Accel& accel, uint64_t seed, uint32_t mask = 0xffffffffu) {
   Rng rng(seed, Stage::test);
   for (const size_t n : {size_t{1}, size_t{7}, size_t{16}, size_t{17}, size_t{64}, size_t{100}, size_t{333}}) {
     for (const bool directional : {false, true}) {
@@ -351,7 +351,8 @@ void expect_bundles_agree_with_single_rays(const Accel& accel, uint64_t seed) {
       size_t differ = 0;
       for (size_t i = 0; i < n; ++i) {
         const Vec3f p{px[i], py[i], pz[i]};
-        const RayHit r = directional ? ray_of(p, light) : ray_of(light, p - light, 0, 1);
+        RayHit r = directional ? ray_of(p, light) : ray_of(light, p - light, 0, 1);
+        r.ray.mask = mask;
         differ += blocked(accel, r) != (out[i] == 1);
         EXPECT_LE(out[i], 1);
       }
@@ -374,6 +375,17 @@ TEST_P(Backends, ManyPointsToOneLightAgreeWithSingleRaysOnInstances) {
     for (uint32_t i = 0; i < 2 + seed % 5; ++i)
       geometry.instances.push_back({i % 2, random_transform(rng, 0.5f + rng.next_float(), i % 3 == 0)});
     for (const bool robust : {true, false}) expect_bundles_agree_with_single_rays(*make(geometry, robust), seed);
+  }
+}
+
+TEST_P(Backends, ManyPointsToOneLightSeeMeshesByTheirMask) {
+  const Mesh a = test::random_soup(300, 0.1f, 7), b = test::random_soup(300, 0.1f, 9),
+             c = test::random_soup(90, 0.1f, 3);
+  for (const uint32_t mask : {1u, 2u, 4u, 8u}) {
+    AccelGeometry geometry{{a.view(), b.view(), c.view()}, {}, nullptr};
+    geometry.meshes[0].mask = 1, geometry.meshes[1].mask = 2, geometry.meshes[2].mask = 2 | 4;
+    geometry.point_mask = mask;
+    for (const bool robust : {true, false}) expect_bundles_agree_with_single_rays(*make(geometry, robust), 8, mask);
   }
 }
 

@@ -16,9 +16,9 @@ class BesideCycles(unittest.TestCase):
         self.scene.view_layers[0].use_pass_z = True
         h.add_light("SUN", energy=3, rotation=(0.4, 0.3, 0), angle=0.0)
 
-    def compare(self, most=0.01, cycles=16, samples=16, layer=None):
+    def compare(self, most=0.01, cycles=16, samples=16, layer=None, bounces=0, **parameters):
         """Images agree in means of 4x4 pixels; gives ours and the notes."""
-        ours, theirs = h.both(cycles, samples, layer=layer)
+        ours, theirs = h.both(cycles, samples, bounces, layer, **parameters)
         a, b = (h.blocks(image["Combined"]) for image in (ours, theirs))
         np.testing.assert_allclose(a.mean((0, 1)), b.mean((0, 1)), rtol=most, atol=1e-3)
         self.assertLess(np.abs(a - b).max(), 0.06)  # at outlines 16 samples tell coverage to a few per cent
@@ -112,6 +112,99 @@ class Objects(BesideCycles):
         self.compare(cycles=256)
 
 
+class Rays(BesideCycles):
+    """A sphere over a floor: what each kind of ray sees. Without a world, whose light Cycles brings by shadow and diffuse rays in
+    turn, so that a mesh that one kind alone sees darkens it by half."""
+
+    def setUp(self):
+        super().setUp()
+        h.add_plane(3, material=h.diffuse())
+        self.ball = h.add_sphere(0.6, (0.3, 0, 1), h.diffuse((0.8, 0.2, 0.1), "red"))
+
+    def light_path(self, name, first, second, ray):
+        """A material that is `second` where the ray is such a one."""
+        m = h.material(name)
+        nodes, links = m.node_tree.nodes, m.node_tree.links
+        path, mix = nodes.new("ShaderNodeLightPath"), nodes.new("ShaderNodeMixShader")
+        output = next(n for n in nodes if n.type == "OUTPUT_MATERIAL")
+        for i, (kind, colour) in enumerate((first, second)):
+            shader = nodes.new("ShaderNode" + kind)
+            shader.inputs["Color"].default_value = (*colour, 1)
+            links.new(shader.outputs[0], mix.inputs[1 + i])
+        links.new(path.outputs[ray], mix.inputs[0])
+        links.new(mix.outputs[0], output.inputs["Surface"])
+        return m
+
+    def test_visibility_of_objects(self):
+        for rays in (("camera",), ("shadow",), ("diffuse", "shadow"), ("camera", "diffuse")):
+            with self.subTest(hidden=rays):
+                for ray in ("camera", "diffuse", "glossy", "transmission", "shadow"):
+                    setattr(self.ball, "visible_" + ray, ray not in rays)
+                _, notes = self.compare(0.015, cycles=256)
+                self.assertEqual(notes, "")
+
+    def test_indirect_only_collections(self):
+        group = bpy.data.collections.new("Group")
+        self.scene.collection.children.link(group)
+        group.objects.link(self.ball)
+        self.scene.collection.objects.unlink(self.ball)
+        self.scene.view_layers[0].layer_collection.children["Group"].indirect_only = True
+        ours, notes = self.compare(0.015, cycles=256)
+        self.assertEqual(notes, "")
+        self.assertGreater(ours["Depth"].min(), 2.5)
+
+    def test_a_mirror_shows_what_glossy_rays_see(self):
+        self.ball.data.materials[0] = h.diffuse((0.2, 0.8, 0.3), "green")
+        mirror = h.material("mirror")
+        h.shader(mirror, "ShaderNodeBsdfGlossy", Roughness=0.0, Color=(0.9, 0.9, 0.9, 1))
+        self.scene.objects["Plane"].data.materials[0] = mirror
+        for hidden in (False, True):
+            with self.subTest(hidden=hidden):
+                self.ball.visible_glossy = not hidden
+                self.compare(0.03, cycles=400, bounces=3, vpls=4000, samples=4)
+
+    def test_light_path_parts_a_material_by_the_ray(self):
+        for name, first, second, ray in (
+                ("seen", ("BsdfDiffuse", (0.1, 0.1, 0.8)), ("Emission", (0.9, 0.3, 0.1)), "Is Camera Ray"),
+                ("no shadow", ("BsdfDiffuse", (0.8, 0.2, 0.1)), ("BsdfTransparent", (1, 1, 1)), "Is Shadow Ray"),
+                ("bounce", ("BsdfDiffuse", (0.8, 0.2, 0.1)), ("BsdfDiffuse", (0.1, 0.2, 0.8)), "Is Diffuse Ray"),
+                ("shines unseen", ("Emission", (3, 2, 1)), ("BsdfTransparent", (1, 1, 1)), "Is Camera Ray"),
+                ("depth", ("BsdfDiffuse", (0.8, 0.2, 0.1)), ("BsdfDiffuse", (0.1, 0.2, 0.8)), "Ray Depth")):
+            with self.subTest(material=name):
+                self.ball.data.materials[0] = self.light_path(name, first, second, ray)
+                _, notes = self.compare(0.03, cycles=400, bounces=2, vpls=4000, samples=4)
+                self.assertEqual(notes, "")
+
+    def test_what_no_kind_of_ray_tells_is_named(self):
+        self.ball.data.materials[0] = self.light_path(
+            "far", ("BsdfDiffuse", (0.8, 0.2, 0.1)), ("BsdfDiffuse", (0.1, 0.2, 0.8)), "Ray Length")
+        with h.quiet():
+            h.set_lumicut("exhaustive", vpls=50)
+            h.render()
+        self.assertIn("Numbers of a ray's path taken as 0: far (Light Path: Ray Length)", "\n".join(h.last_notes()))
+
+
+class Absorption(BesideCycles):
+    def test_glass_takes_the_light_of_the_way_through_it(self):
+        """A slab and a ball over an emissive floor, seen through both borders."""
+        h.add_plane(3, material=h.emission(1, (1, 1, 1)))
+        for kind, inputs in (("VolumeAbsorption", {"Density": 1.5, "Color": (0.9, 0.5, 0.2, 1)}),
+                             ("VolumePrincipled", {"Density": 2.0, "Color": (0, 0, 0, 1), "Absorption Color": (0.5, 0.2, 0.1, 1)})):
+            with self.subTest(volume=kind):
+                m = h.material(kind)
+                h.shader(m, "ShaderNodeBsdfGlass", Roughness=0.0, IOR=1.3)
+                volume = m.node_tree.nodes.new("ShaderNode" + kind)
+                for name, value in inputs.items():
+                    volume.inputs[name].default_value = value
+                output = next(n for n in m.node_tree.nodes if n.type == "OUTPUT_MATERIAL")
+                m.node_tree.links.new(volume.outputs[0], output.inputs["Volume"])
+                slab = h.add_mesh("Slab", *CUBE, m)
+                slab.location, slab.scale = (0, 0, 1), (2, 2, 0.3)
+                _, notes = self.compare(0.02, cycles=400, samples=64, bounces=8)
+                self.assertNotIn("olumes", notes)
+                bpy.data.objects.remove(slab)
+
+
 class Layers(BesideCycles):
     def setUp(self):
         super().setUp()
@@ -159,19 +252,15 @@ class Layers(BesideCycles):
         group.objects.link(self.ball)
         self.scene.collection.objects.unlink(self.ball)
         twin = h.link(bpy.data.objects.new("Twin", self.ball.data))
-        twin.visible_shadow, twin.is_shadow_catcher = False, True
+        twin.is_shadow_catcher = True
         of_layer = self.layer.layer_collection.children["Group"]
-        for flag, text in (("holdout", "Holdouts taken as ordinary objects: Sphere"),
-                           ("indirect_only", "Objects of Indirect Only collections, which the camera sees here: Sphere")):
-            with self.subTest(flag=flag), h.quiet():
-                of_layer.holdout = of_layer.indirect_only = False
-                setattr(of_layer, flag, True)
-                h.set_lumicut("exhaustive", vpls=50)
-                h.render()
-                self.assertIn(text, h.last_notes())
-                # Flags of an object whose mesh another has, too.
-                self.assertIn("Objects hidden from some rays, which all see here: Twin", h.last_notes())
-                self.assertIn("Shadow catchers taken as ordinary objects: Twin", h.last_notes())
+        of_layer.holdout = True
+        with h.quiet():
+            h.set_lumicut("exhaustive", vpls=50)
+            h.render()
+        self.assertIn("Holdouts taken as ordinary objects: Sphere", h.last_notes())
+        # Flags of an object whose mesh another has, too.
+        self.assertIn("Shadow catchers taken as ordinary objects: Twin", h.last_notes())
 
     def test_notes_of_all_layers_are_shown(self):
         m = h.material("Toon")

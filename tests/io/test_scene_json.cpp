@@ -68,6 +68,22 @@ TEST(SceneJson, TheCameraStandsAsItsAxesSay) {
   EXPECT_EQ(scene.camera.shift[1], -1.0f);
 }
 
+TEST(SceneJson, MeshesAreHiddenFromKindsOfRays) {
+  const auto mask = [](const json& kinds) {
+    return changed([&](json& s) { s["meshes"][0]["hidden_from"] = kinds; }).meshes[0].mask;
+  };
+  EXPECT_EQ(changed([](json&) {}).meshes[0].mask, 0u) << "all see it";
+  EXPECT_EQ(mask({"camera", "shadow"}) & 31u,
+            uint32_t{LUMICUT_DIFFUSE_RAYS | LUMICUT_GLOSSY_RAYS | LUMICUT_TRANSMISSION_RAYS});
+  const uint32_t none = mask({"camera", "diffuse", "glossy", "transmission", "shadow"});
+  EXPECT_EQ(none & 31u, 0u);
+  EXPECT_NE(none, 0u) << "which would be all";
+  expect_in(error([](json& s) {
+              s["meshes"][0]["hidden_from"] = {"camera", "shadows"};
+            }),
+            {"meshes[0].hidden_from[1]", "\"shadows\"", "\"shadow\""});
+}
+
 TEST(SceneJson, UnitScaleTurnsLengthsIntoMetresAndNothingElse) {
   const SceneData scene = changed([](json& s) {
     s["unit_scale"] = 0.01;

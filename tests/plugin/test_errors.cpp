@@ -164,6 +164,7 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
       {[](M& m) { m.coat_ior = 0.5f; }, "lumicut_material[3].coat_ior: 0.5 is not in [1, 10]"},
       {[](M& m) { m.flags = LUMICUT_PHONG | LUMICUT_GGX; }, "lumicut_material[3].flags: holds both"},
       {[](M& m) { m.specular_tint[1] = 1.5f; }, "lumicut_material[3].specular_tint[1]: 1.5 is not in [0, 1]"},
+      {[](M& m) { m.absorption[1] = -2; }, "lumicut_material[3].absorption[1]: -2"},
       {[](M& m) { m.flags = LUMICUT_BURLEY; }, "lumicut_material[3].flags: holds LUMICUT_BURLEY without LUMICUT_GGX"},
       {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_BURLEY | LUMICUT_NO_FRESNEL; },
        "lumicut_material[3].flags: holds both LUMICUT_BURLEY and LUMICUT_NO_FRESNEL"},

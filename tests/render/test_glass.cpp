@@ -14,12 +14,14 @@ enum class Glass {
   slab,
   ball,
   paper,
+  tinted_ball,  // absorbs inside
   // Light passes straight.
   straight_sheet,
   straight_slab,
   straight_ball,
   straight_rough,
   straight_lamp,
+  straight_tinted,
 };
 
 void add_ball(Mesh& mesh, const Vec3f& center, float radius, uint32_t material) {
@@ -43,6 +45,7 @@ std::unique_ptr<Scene> make_glass(Glass kind) {
   glowing.emission = {2, 2, 2};
   if (kind >= Glass::straight_sheet) glass.shadows_pass = true;
   if (kind == Glass::straight_sheet) glass.diffuse = {0.8f, 0.7f, 0.9f};
+  if (kind == Glass::tinted_ball || kind == Glass::straight_tinted) glass.absorption = {1, 4, 2};
   if (kind == Glass::straight_rough) glass.roughness = 0.4f;
   if (kind == Glass::straight_lamp) {
     // Close to the pane, so that the clamp takes much of what passes, and in the half of the camera a mesh of its own.
@@ -73,10 +76,12 @@ std::unique_ptr<Scene> make_glass(Glass kind) {
       test::add_quad(mesh, {-1, 0, 1}, {1, 0, 1}, {1, 0, -1}, {-1, 0, -1}, 1);
       break;
     case Glass::straight_slab:
+    case Glass::straight_tinted:
     case Glass::slab:
       test::add_box(mesh, {-1.1f, 0, -1.1f}, {1.1f, 0.1f, 1.1f}, 1, false);
       break;
     case Glass::straight_ball:
+    case Glass::tinted_ball:
     case Glass::ball:
       add_ball(mesh, {0, 0.1f, 0}, 0.6f, 1);
   }
@@ -126,7 +131,8 @@ class OfGlass : public testing::TestWithParam<Glass> {};
 INSTANTIATE_TEST_SUITE_P(Kinds, OfGlass,
                          testing::Values(Glass::none, Glass::sheet_out, Glass::sheet_in, Glass::slab, Glass::ball,
                                          Glass::paper, Glass::straight_sheet, Glass::straight_slab,
-                                         Glass::straight_ball, Glass::straight_rough, Glass::straight_lamp));
+                                         Glass::straight_ball, Glass::straight_rough, Glass::straight_lamp,
+                                         Glass::tinted_ball, Glass::straight_tinted));
 
 TEST_P(OfGlass, CompensatedIterationsGiveThePathTracersImage) {
   const auto scene = make_glass(GetParam());
@@ -158,6 +164,75 @@ TEST(StraightGlass, OfASlabLetsThroughAsMuchAsOneThatBends) {
   const double ratio = mean(Glass::straight_slab) / mean(Glass::slab);
   RecordProperty("ratio", std::to_string(ratio));
   EXPECT_NEAR(ratio, 1.0, test::kSanitized ? 0.06 : 0.03);
+}
+
+// A slab of 0.5 that absorbs, seen or lit straight on.
+struct TintedSlab {
+  static constexpr Rgb kAbsorption{0.5f, 1, 2};
+  static constexpr double kReflected = 0.04;
+
+  static std::unique_ptr<Scene> make(bool straight, const Transform& to_world = {}) {
+    auto scene = std::make_unique<Scene>(Scene::Config{"bvh", true});
+    Material glass = test::diffuse(1, 1, 1), glowing = test::diffuse(0, 0, 0);
+    glass.lobe = LobeModel::ggx, glass.specular = {1, 1, 1}, glass.roughness = 0, glass.transmission = 1;
+    glass.absorption = kAbsorption, glass.shadows_pass = straight;
+    glowing.emission = {1, 1, 1};
+    scene->set_materials({straight ? test::diffuse(0.5f, 0.5f, 0.5f) : glowing, glass});
+    Mesh wall, slab;
+    test::add_quad(wall, {-5, -5, 0}, {5, -5, 0}, {5, 5, 0}, {-5, 5, 0}, 0);
+    test::add_box(slab, {-4, -4, 1}, {4, 4, 1.5f}, 1, false);
+    slab.instances = {to_world};
+    scene->add_mesh(std::move(wall)), scene->add_mesh(std::move(slab));
+    return scene;
+  }
+  static Rgb mean(Scene& scene, float height, float from, uint32_t pixels, uint32_t samples) {
+    Camera camera;
+    camera.orthographic = true, camera.height = height, camera.position = {0, 0, from};
+    camera.right = {1, 0, 0}, camera.forward = {0, 0, -1}, camera.up = {0, 1, 0};
+    scene.set_camera(camera);
+    Progress progress;
+    scene.commit(progress);
+    Rgb sum{};
+    const auto image = test::render(scene, "exhaustive", test::lights_of(scene, 100), {},
+                                    {.width = pixels, .height = pixels, .samples = samples});
+    for (const Rgb& c : image.radiance) sum += c * (1.0f / static_cast<float>(image.radiance.size()));
+    return sum;
+  }
+};
+
+// L·T²·a / (1 − R²a²) with a = e^(−σd): what goes to and fro in the slab is in it. [Beer, Lambert; Stokes 1862]
+TEST(TintedGlass, ASlabShowsWhatIsBehindItByBeersLaw) {
+  const auto scene = TintedSlab::make(false);
+  const Rgb seen = TintedSlab::mean(*scene, 0.1f, 3, 16, test::kSanitized ? 16 : 256);
+  for (int k = 0; k < 3; ++k) {
+    const double a = std::exp(-0.5 * TintedSlab::kAbsorption[k]), r = TintedSlab::kReflected;
+    // Reflection is by chance: 4 % of 65,536 samples.
+    EXPECT_NEAR(seen[k], (1 - r) * (1 - r) * a / (1 - r * r * a * a), test::kSanitized ? 0.02 : 0.004) << k;
+  }
+}
+
+// Shadow rays know the slab's thickness by its volume and area: here to the edges' 6 %, whatever the instance's size.
+TEST(TintedGlass, ASunThroughASlabIsDimmedByBeersLaw) {
+  const auto lit = [](bool slab, float size) {
+    Transform to_world;
+    for (const int k : {0, 5, 10}) to_world.m[k] = size;
+    if (!slab) to_world.m[3] = 100;
+    const auto scene = TintedSlab::make(true, to_world);
+    Light sun;
+    sun.type = LightType::sun, sun.direction = {0, 0, -1}, sun.value = {1, 1, 1};
+    scene->set_lights({sun});
+    return luminance(TintedSlab::mean(*scene, 1, 0.5f * size, 64, 1));
+  };
+  for (const float size : {1.0f, 0.5f, 2.0f}) {
+    double expected = 0;
+    const double r = TintedSlab::kReflected;
+    Rgb passed{};
+    for (int k = 0; k < 3; ++k)
+      passed[k] = static_cast<float>(
+          (1 - r) * std::exp(-0.25 * size * TintedSlab::kAbsorption[k] * 8 * 8 / (8 * 8 + 2 * 8 * 0.5)));
+    expected = luminance(passed) * luminance(passed);  // a border at a time, by chance
+    EXPECT_NEAR(lit(true, size) / lit(false, size), expected, 0.03) << size;
+  }
 }
 
 }  // namespace

@@ -144,6 +144,8 @@ typedef struct lumicut_material {
   int32_t translucency_texture; /* 1 + index; 0: none. Multiplies */
   /* LUMICUT_GGX alone */
   float specular_tint[3];      /* 0..1: of metal at 82 degrees, over its colour there; of what glass reflects; all 0: not given, taken as 1 */
+  float absorption[3];         /* 0 or above, 1/length: light inside closed glass falls by exp(-absorption times the way); shadow rays that pass
+                                  straight know the mesh's mean thickness alone, 2 volume / area */
 } lumicut_material;
 enum {
   LUMICUT_EMIT_BOTH_SIDES = 1,
@@ -154,9 +156,21 @@ enum {
   LUMICUT_SHADOWS_PASS = 32
 };
 
+/* Kinds of rays. What shadow rays do not see lets light through; what diffuse rays do not see lights nothing and holds no
+   virtual lights, though shadow rays may be stopped by it. Glossy: mirrors, and gloss where rays follow it (in images of
+   virtual lights that is what `compensate` does; else gloss shows what diffuse rays see). Transmission: through glass. Straight
+   through glass rays stay what they were. */
+enum {
+  LUMICUT_CAMERA_RAYS = 1,
+  LUMICUT_DIFFUSE_RAYS = 2,
+  LUMICUT_GLOSSY_RAYS = 4,
+  LUMICUT_TRANSMISSION_RAYS = 8,
+  LUMICUT_SHADOW_RAYS = 16
+};
+
 typedef struct lumicut_mesh {
   uint32_t struct_size;
-  uint32_t mask;              /* seen by rays with (mask & ray mask) != 0; 0: all */
+  uint32_t mask;              /* LUMICUT_CAMERA_RAYS ...: the kinds of rays that see it, as masks of rays are; 0: all */
   const float* positions;     /* xyz */
   const float* normals;       /* xyz a vertex, for shading; NULL: flat */
   const float* uvs;           /* uv a vertex; NULL: 0 */
