@@ -316,6 +316,8 @@ class SceneReader {
     if (auto both = object.find("emit_both_sides"))
       m.flags =
           (m.flags & ~uint32_t{LUMICUT_EMIT_BOTH_SIDES}) | (both->boolean() ? uint32_t{LUMICUT_EMIT_BOTH_SIDES} : 0u);
+    if (auto holdout = object.find("holdout"))
+      m.flags = (m.flags & ~uint32_t{LUMICUT_HOLDOUT}) | (holdout->boolean() ? uint32_t{LUMICUT_HOLDOUT} : 0u);
     const auto texture = [&](const char* key, int32_t& out, TextureUse use, bool by_view = false) {
       const auto value = object.find(key);
       if (!value) return;

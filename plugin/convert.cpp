@@ -80,7 +80,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   const FieldValidator c("lumicut_material", index);
   c.flags("flags", in.flags,
           LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG | LUMICUT_GGX | LUMICUT_NO_FRESNEL | LUMICUT_BURLEY |
-              LUMICUT_SHADOWS_PASS);
+              LUMICUT_SHADOWS_PASS | LUMICUT_HOLDOUT);
   if ((in.flags & LUMICUT_PHONG) != 0 && (in.flags & LUMICUT_GGX) != 0)
     c.fail("flags", "holds both LUMICUT_PHONG and LUMICUT_GGX");
   if ((in.flags & LUMICUT_NO_FRESNEL) != 0) {
@@ -120,6 +120,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   m.fresnel = (in.flags & LUMICUT_NO_FRESNEL) == 0;
   m.burley = (in.flags & LUMICUT_BURLEY) != 0;
   m.shadows_pass = (in.flags & LUMICUT_SHADOWS_PASS) != 0;
+  m.holdout = (in.flags & LUMICUT_HOLDOUT) != 0;
   c.range("specular_tint", in.specular_tint, 0.0f, 1.0f);
   if (max_component(vec(in.specular_tint)) > 0.0f) m.specular_tint = vec(in.specular_tint);
   c.not_negative("absorption", in.absorption);

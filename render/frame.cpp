@@ -87,6 +87,7 @@ class Batch {
           continue;
         }
         const SurfaceInteraction seen = scene_.interaction(rays[i], static_cast<uint32_t>(p));
+        if (scene_.materials()[seen.material].holdout) continue;
         first_hit(seen, p, cosines[i]);
         const auto layers = seen.bsdf.layers();
         hit[at] = 1, found[at] = layers[0];

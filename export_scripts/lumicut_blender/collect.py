@@ -281,6 +281,7 @@ class Collector:
             slots = [override]
         else:
             slots = [slot.material for slot in ob.material_slots] or [None]
+        held_out = ob.is_holdout or ob.holdout_get(view_layer=self.depsgraph.view_layer_eval)  # its own, or its collection's
         of_slots = [self.materials.numbers(material, lambda: self._is_pane(mesh, instance.matrix_world)) for material in slots]
         if ob.as_pointer() not in self._looked_at:
             self._looked_at.add(ob.as_pointer())
@@ -289,6 +290,8 @@ class Collector:
         masks = {}
         hidden = self._hidden_from(ob)
         for (ray, bit), numbers in zip(library.RAYS.items(), zip(*of_slots)):
+            if held_out and ray == "camera":
+                numbers = tuple(self.materials.held_out(n) for n in numbers)
             if ray not in hidden:
                 masks[numbers] = masks.get(numbers, 0) | bit
         for numbers, mask in masks.items():
@@ -337,9 +340,6 @@ class Collector:
         return hidden
 
     def _check_flags(self, ob):
-        layer = self.depsgraph.view_layer_eval
-        if ob.is_holdout or ob.holdout_get(view_layer=layer):  # its own, or its collection's
-            self.report.note(ob.name, "Holdouts taken as ordinary objects")
         if ob.is_shadow_catcher:
             self.report.note(ob.name, "Shadow catchers taken as ordinary objects")
 

@@ -182,6 +182,8 @@ class Writer:
                     out[key] = self.texture(getattr(m, key), "vectors")
         else:
             out["shininess"] = numbers([m.shininess])[0]
+        if m.flags & library.HOLDOUT:
+            out["holdout"] = True
         if m.flags & library.PHONG:
             out["model"] = "phong"
         if m.opacity not in (0.0, 1.0):

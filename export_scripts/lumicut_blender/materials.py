@@ -97,6 +97,7 @@ class Surface:
     emission: Value = ZERO
     opacity: Value = ONE
     clear: bool = False  # lets light pass, and does nothing else
+    holdout: bool = False  # the camera sees a hole
     shadows_pass: bool = False  # glass that does not stop shadow rays
     rough_picture: Value = None  # `roughness` is its mean then
     by_place: ByPlace = None
@@ -174,11 +175,14 @@ class SurfaceReader(Evaluator):
             whole = sum(h * c.share for h, c in coats)
             clearcoat = ClearCoat(min(1.0, whole), sum(h * c.share * c.roughness for h, c in coats) / whole,
                                   max(coats, key=lambda x: x[0] * x[1].share)[1].ior)
+        if a.holdout != b.holdout and (g if a.holdout else f).scalar() > 0.01:
+            self.note("Holdout", "Holdouts mixed with other shaders, taken as whole where they are half or more")
         summed = {slot: self.add(self.multiply(f, getattr(a, slot)), self.multiply(g, getattr(b, slot)))
                   for slot in (*REFLECTED, "emission", "opacity")}
         return Surface(roughness=roughness, ior=a.ior if luminance(a.glass) > luminance(b.glass) else b.ior,
                        rough_picture=picture, by_place=by_place, clearcoat=clearcoat, burley=a.burley if da >= db else b.burley,
-                       tint=a.tint if wa >= wb else b.tint, shadows_pass=a.shadows_pass or b.shadows_pass, **summed)
+                       tint=a.tint if wa >= wb else b.tint, shadows_pass=a.shadows_pass or b.shadows_pass,
+                       holdout=(f.scalar() if a.holdout else 0) + (g.scalar() if b.holdout else 0) >= 0.5, **summed)
 
     def closure_mix_shader(self, node, stack):
         a, b = self.surface(node.inputs[1], stack), self.surface(node.inputs[2], stack)
@@ -302,8 +306,9 @@ class SurfaceReader(Evaluator):
         return Surface(opacity=ZERO, clear=True)
 
     def closure_holdout(self, node, stack):
-        self.note("Holdout", "Shaders left out")
-        return Surface()
+        if self.ray == "camera":
+            self.by_ray = True  # others see a black surface
+        return Surface(holdout=self.ray == "camera")
 
     def loss(self, node, gloss, ior):
         """Factor of what passes glass; darker where the node lets rough glass lose light."""
@@ -458,6 +463,16 @@ class Materials:
         self._numbers, self._picture_numbers = {}, {}
         self._by_ray = set()  # names of materials that Light Path parts
 
+    def held_out(self, number):
+        """Index of the same material as a hole to the camera."""
+        if (number, "held out") not in self._numbers:
+            self._numbers[number, "held out"] = len(self.converted)
+            base = self.converted[number]
+            values = type(base.values).from_buffer_copy(base.values)
+            values.flags |= library.HOLDOUT
+            self.converted.append(dataclasses.replace(base, name=base.name + " (holdout)", values=values))
+        return self._numbers[number, "held out"]
+
     def numbers(self, material, pane=lambda: False):
         """Index of a Blender material for each kind of ray, in the order of library.RAYS; see number()."""
         first = self.number(material, pane)
@@ -535,6 +550,8 @@ class Materials:
         m.emission[:] = factors["emission"].tolist()
         if factors["emission"].any():
             m.flags |= library.EMIT_BOTH_SIDES
+        if surface.holdout:
+            m.flags |= library.HOLDOUT
         opacity = float(factors["opacity"].mean())
         m.opacity = min(1.0, max(opacity, HOLE))
         if normals is not None:

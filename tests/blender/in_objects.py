@@ -175,6 +175,22 @@ class Rays(BesideCycles):
                 _, notes = self.compare(0.03, cycles=400, bounces=2, vpls=4000, samples=4)
                 self.assertEqual(notes, "")
 
+    def test_holdouts_are_holes_to_the_camera(self):
+        """Black, and clear where the film is; their shadows stay, and mirrors show them."""
+        self.scene.render.film_transparent = True
+        mirror = h.material("mirror")
+        h.shader(mirror, "ShaderNodeBsdfGlossy", Roughness=0.0, Color=(0.9, 0.9, 0.9, 1))
+        for floor, shader in ((h.diffuse(), False), (mirror, False), (h.diffuse(), True)):
+            with self.subTest(floor=floor.name, shader=shader):
+                self.scene.objects["Plane"].data.materials[0] = floor
+                self.ball.is_holdout = not shader
+                if shader:
+                    self.ball.data.materials[0] = h.material("Hole")
+                    h.shader(self.ball.data.materials[0], "ShaderNodeHoldout")
+                ours, notes = self.compare(0.03, cycles=400, bounces=2, vpls=4000, samples=16)
+                self.assertNotIn("oldout", notes)
+                self.assertLess(ours["Combined"][..., 3].min(), 0.01)
+
     def test_what_no_kind_of_ray_tells_is_named(self):
         self.ball.data.materials[0] = self.light_path(
             "far", ("BsdfDiffuse", (0.8, 0.2, 0.1)), ("BsdfDiffuse", (0.1, 0.2, 0.8)), "Ray Length")
@@ -258,7 +274,7 @@ class Layers(BesideCycles):
         with h.quiet():
             h.set_lumicut("exhaustive", vpls=50)
             h.render()
-        self.assertIn("Holdouts taken as ordinary objects: Sphere", h.last_notes())
+        self.assertFalse([note for note in h.last_notes() if "oldout" in note])
         # Flags of an object whose mesh another has, too.
         self.assertIn("Shadow catchers taken as ordinary objects: Twin", h.last_notes())
 

@@ -175,7 +175,7 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
        "lumicut_material[3].flags: holds LUMICUT_SHADOWS_PASS without LUMICUT_GGX"},
       {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_SHADOWS_PASS, m.transmission = 0; },
        "lumicut_material[3].transmission: must be above 0 with LUMICUT_SHADOWS_PASS"},
-      {[](M& m) { m.flags = 64; }, "lumicut_material[3].flags: 64", LUMICUT_UNSUPPORTED},
+      {[](M& m) { m.flags = 128; }, "lumicut_material[3].flags: 128", LUMICUT_UNSUPPORTED},
   };
   for (const auto& w : wrongs) {
     auto m = materials();

@@ -87,6 +87,7 @@ std::vector<Change> scene_changes() {
       material("material.flags (shadows pass)", [](M& m) { m.flags |= LUMICUT_SHADOWS_PASS, m.transmission = 0.5f; }),
       material("material.specular_tint",
                [](M& m) { m.specular_tint[0] = m.specular_tint[1] = 1, m.specular_tint[2] = 0.5f; }),
+      material("material.flags (holdout)", [](M& m) { m.flags |= LUMICUT_HOLDOUT; }),
       material("material.absorption", [](M& m) { m.absorption[2] = 0.5f, m.transmission = 0.5f; }),
       material("material.translucency", [](M& m) { m.translucency[1] = 0.25f; }),
       material("material.height_texture", [](M& m) { m.height_texture = 1; }),

@@ -95,6 +95,28 @@ TEST_P(RayKinds, WhatTheCameraDoesNotSeeDarkensAndColoursAllTheSame) {
   EXPECT_GT(green, 1.02);
 }
 
+// Its shadow and its light on the rest stay; the camera sees neither it nor what is behind.
+TEST_P(RayKinds, AHoldoutIsAHoleToTheCameraAlone) {
+  const auto holdout = [](bool held) {
+    return [=](Scene& scene) {
+      std::vector<Material> materials = scene.materials();
+      materials[2].holdout = held;
+      scene.set_materials(materials);
+      box(kAllRays)(scene);
+    };
+  };
+  const auto there = render(*room(holdout(false), GetParam())), held = render(*room(holdout(true), GetParam()));
+  size_t holes = 0;
+  for (size_t i = 0; i < held.size(); ++i) {
+    if (held[i] == Rgb{})
+      ++holes;
+    else
+      EXPECT_EQ(held[i], there[i]);
+  }
+  EXPECT_GT(holes, kWidth * kHeight / 20);
+  EXPECT_LT(holes, kWidth * kHeight / 2);
+}
+
 TEST_P(RayKinds, AMirrorShowsWhatGlossyRaysSee) {
   const auto mirror = [&](uint32_t mask) {
     return render(*room(

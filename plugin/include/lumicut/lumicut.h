@@ -153,7 +153,8 @@ enum {
   LUMICUT_GGX = 4,
   LUMICUT_NO_FRESNEL = 8,
   LUMICUT_BURLEY = 16,
-  LUMICUT_SHADOWS_PASS = 32
+  LUMICUT_SHADOWS_PASS = 32,
+  LUMICUT_HOLDOUT = 64 /* camera rays that meet it show black, and count in no channel: alpha is 0 there. Other rays see it */
 };
 
 /* Kinds of rays. What shadow rays do not see lets light through; what diffuse rays do not see lights nothing and holds no
