@@ -491,6 +491,8 @@ class Materials:
             same = ray != "camera" and self.converted[self._numbers[key[0]]].is_same(converted)
             self._numbers[key] = self._numbers[key[0]] if same else len(self.converted)
             if not same:
+                if ray != "camera":
+                    converted.name += f" ({ray} rays)"
                 self.converted.append(converted)
         number = self._numbers[key]
         values = self.converted[number].values

@@ -399,8 +399,8 @@ class MaterialTrees(unittest.TestCase):
         links.new(glass.outputs[0], mix.inputs[1 if glass_first else 2])
         links.new(clear.outputs[0], mix.inputs[2 if glass_first else 1])
         h.add_sphere(segments=8).data.materials.append(m)
-        data, notes = collected()
-        return dict(data.materials)["Window"], notes
+        self.data, notes = collected()
+        return dict(self.data.materials)["Window"], notes
 
     def test_glass_that_is_clear_to_shadow_rays_lets_light_pass(self):
         out, notes = self.window("Is Shadow Ray")
@@ -408,15 +408,17 @@ class MaterialTrees(unittest.TestCase):
         self.assertEqual((out.transmission, out.opacity), (1, 1))
         self.assertFalse(any("Window" in n for n in notes), notes)
 
-    def test_other_mixes_by_the_ray_are_taken_as_the_camera_has_them(self):
+    def test_other_mixes_by_the_ray_hide_from_it_what_is_clear_to_it(self):
         out, notes = self.window("Is Glossy Ray")
         self.assertEqual(out.flags, library.GGX)
-        self.assertTrue(any("Light Path" in n for n in notes))
+        self.assertEqual([mesh.mask for mesh in self.data.meshes], [library.ALL_RAYS & ~library.GLOSSY_RAYS])
+        self.assertFalse(any("Light Path" in n for n in notes))
 
-    def test_what_is_not_glass_stops_shadow_rays(self):
+    def test_what_is_not_glass_and_clear_to_shadow_rays_is_hidden_from_them(self):
         out, notes = self.window("Is Shadow Ray", kind="ShaderNodeBsdfDiffuse")
         self.assertEqual(out.flags & library.SHADOWS_PASS, 0)
-        self.assertTrue(any("Light Path" in n for n in notes))
+        self.assertEqual([mesh.mask for mesh in self.data.meshes], [library.ALL_RAYS & ~library.SHADOW_RAYS])
+        self.assertFalse(any("Light Path" in n for n in notes))
 
     def test_principled_with_half_transmission(self):
         m, _ = self.principled(**{"Base Color": (0.6, 0.6, 0.6, 1), "Transmission|Transmission Weight": 0.5,
