@@ -83,8 +83,8 @@ class Bsdf {
   std::optional<ScatterSample> scatter(Rng& rng) const;
   // Of a path behind the first surface that lights are sampled at: straight through glass, where shadows pass.
   PathChoice choose(Rng& rng) const;
-  // What absorbs a ray that leaves by a sample with such flags, for each unit of length; `before`: what absorbed the one that
-  // came. Glass inside glass ends the outer one's.
+  // What absorbs a ray that leaves by a sample with such flags, for each unit of length; `before`: what absorbed the one
+  // that came. Glass inside glass ends the outer one's.
   Rgb absorption_after(uint32_t flags, const Rgb& before) const {
     if ((flags & kTransmitted) != 0) return behind_ ? Rgb{} : parameters_.absorption;
     return behind_ ? parameters_.absorption : before;

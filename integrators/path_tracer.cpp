@@ -195,7 +195,7 @@ class PathTracer final : public Integrator {
       const double cosine = std::max(1e-9f, std::abs(dot(at.geometric_normal, at.to_viewer)));
       const double distance = double{path.travelled} + at.t;
       const double density = sampler_->mesh_density(at) * distance * distance / cosine;
-      const bool sampled_alone = !path.specular && sampler_->mesh_light(at.mesh) == LightSampler::MeshLight::by_samples;
+      const bool sampled_alone = !path.specular && mesh_light(scene_->meshes()[at.mesh]) == MeshLight::by_samples;
       if (!sampled_alone) sum += path.weight * at.emitted * (path.specular ? 1.0f : power_heuristic(path.pdf, density));
     }
     const bool last = path.depth >= max_depth_;

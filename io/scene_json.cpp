@@ -272,21 +272,21 @@ class SceneReader {
       if (!of_model) value->fail(ggx ? "is not of the model \"ggx\"" : "is of the model \"ggx\" alone");
       out = static_cast<float>(value->number(low, high));
     };
+    const auto set_flag = [&](uint32_t flag, bool on) { m.flags = on ? m.flags | flag : m.flags & ~flag; };
     if (auto fresnel = object.find("fresnel")) {
       if (!ggx) fresnel->fail("is of the model \"ggx\" alone");
-      m.flags = (m.flags & ~uint32_t{LUMICUT_NO_FRESNEL}) | (fresnel->boolean() ? 0u : uint32_t{LUMICUT_NO_FRESNEL});
+      set_flag(LUMICUT_NO_FRESNEL, !fresnel->boolean());
     }
     if (auto burley = object.find("burley")) {
       if (!ggx) burley->fail("is of the model \"ggx\" alone");
-      m.flags = (m.flags & ~uint32_t{LUMICUT_BURLEY}) | (burley->boolean() ? uint32_t{LUMICUT_BURLEY} : 0u);
+      set_flag(LUMICUT_BURLEY, burley->boolean());
       if ((m.flags & LUMICUT_BURLEY) != 0 && (m.flags & LUMICUT_NO_FRESNEL) != 0)
         burley->fail("must be false where \"fresnel\" is");
     }
     const auto shadows = object.find("shadows_pass");
     if (shadows) {
       if (!ggx) shadows->fail("is of the model \"ggx\" alone");
-      m.flags =
-          (m.flags & ~uint32_t{LUMICUT_SHADOWS_PASS}) | (shadows->boolean() ? uint32_t{LUMICUT_SHADOWS_PASS} : 0u);
+      set_flag(LUMICUT_SHADOWS_PASS, shadows->boolean());
     }
     if (!ggx) m.flags &= ~uint32_t{LUMICUT_NO_FRESNEL | LUMICUT_BURLEY | LUMICUT_SHADOWS_PASS};
     if (auto tint = object.find("specular_tint")) {
@@ -313,11 +313,8 @@ class SceneReader {
     number("coat", m.coat, 0, 1, ggx);
     number("coat_roughness", m.coat_roughness, 0, 1, ggx);
     number("coat_ior", m.coat_ior, 1, 10, ggx);
-    if (auto both = object.find("emit_both_sides"))
-      m.flags =
-          (m.flags & ~uint32_t{LUMICUT_EMIT_BOTH_SIDES}) | (both->boolean() ? uint32_t{LUMICUT_EMIT_BOTH_SIDES} : 0u);
-    if (auto holdout = object.find("holdout"))
-      m.flags = (m.flags & ~uint32_t{LUMICUT_HOLDOUT}) | (holdout->boolean() ? uint32_t{LUMICUT_HOLDOUT} : 0u);
+    if (auto both = object.find("emit_both_sides")) set_flag(LUMICUT_EMIT_BOTH_SIDES, both->boolean());
+    if (auto holdout = object.find("holdout")) set_flag(LUMICUT_HOLDOUT, holdout->boolean());
     const auto texture = [&](const char* key, int32_t& out, TextureUse use, bool by_view = false) {
       const auto value = object.find(key);
       if (!value) return;

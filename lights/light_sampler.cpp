@@ -120,7 +120,7 @@ void LightSampler::add_triangles(std::vector<double>& weights, const Progress* p
   size_t count = 0;
   for (uint32_t m = 0; m < scene_.meshes().size(); ++m) {
     const Mesh& mesh = scene_.meshes()[m];
-    if (mesh_light(m) == MeshLight::by_rays) continue;
+    if (mesh_light(mesh) == MeshLight::by_rays) continue;
     for (uint32_t t = 0; t < mesh.triangle_count(); ++t) {
       check_now_and_then(progress, t);
       if (materials[mesh.material_of(t)].emissive()) count += scene_.instance_count(m);
@@ -162,7 +162,7 @@ void LightSampler::add_triangles(std::vector<double>& weights, const Progress* p
 
   for (uint32_t m = 0; m < scene_.meshes().size(); ++m) {
     const Mesh& mesh = scene_.meshes()[m];
-    if (mesh_light(m) == MeshLight::by_rays) continue;
+    if (mesh_light(mesh) == MeshLight::by_rays) continue;
     for (uint32_t t = 0; t < mesh.triangle_count(); ++t) {
       check_now_and_then(progress, t);
       const Material& material = materials[mesh.material_of(t)];
@@ -203,20 +203,20 @@ double LightSampler::area_density(double emission) const {
   return (1.0 - environment_share_) * std::numbers::pi * emission / power_.sum(extended_, sampler_.size());
 }
 
-LightSampler::MeshLight LightSampler::mesh_light(uint32_t mesh) const {
-  const uint32_t mask = scene_.meshes()[mesh].mask;
-  if ((mask & kDiffuseRay) == 0) return MeshLight::by_rays;
-  return (mask & kGlossyRay) != 0 ? MeshLight::by_samples_and_rays : MeshLight::by_samples;
+MeshLight mesh_light(const Mesh& mesh) {
+  if ((mesh.mask & kDiffuseRay) == 0) return MeshLight::by_rays;
+  return (mesh.mask & kGlossyRay) != 0 ? MeshLight::by_samples_and_rays : MeshLight::by_samples;
 }
 
 bool LightSampler::found_by_rays(const Emitter& e) const {
-  if (e.kind == Kind::triangle) return mesh_light(e.index) == MeshLight::by_samples_and_rays;
+  if (e.kind == Kind::triangle) return mesh_light(scene_.meshes()[e.index]) == MeshLight::by_samples_and_rays;
   return e.kind != Kind::sphere && e.kind != Kind::sun;
 }
 
 double LightSampler::mesh_density(const SurfaceHit& surface) const {
   const Material& material = scene_.materials()[surface.material];
-  if (!material.emissive() || !has_extended() || mesh_light(surface.mesh) == MeshLight::by_rays) return 0.0;
+  if (!material.emissive() || !has_extended()) return 0.0;
+  if (mesh_light(scene_.meshes()[surface.mesh]) == MeshLight::by_rays) return 0.0;
   return area_density(material.emission_texture >= 0 ? textured_[surface.mesh][surface.triangle]
                                                      : luminance(material.emission));
 }

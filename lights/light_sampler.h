@@ -13,6 +13,11 @@
 
 namespace lumicut {
 
+// What finds the light of an emissive mesh: samples stand for it where diffuse rays see it, and rays that leave a point
+// that lights are sampled at find it too where glossy ones see it as well.
+enum class MeshLight : uint8_t { by_samples, by_samples_and_rays, by_rays };
+MeshLight mesh_light(const Mesh& mesh);
+
 // Where a light path starts.
 struct EmittedRay {
   Vec3f origin, direction;  // unit
@@ -79,11 +84,8 @@ class LightSampler {
   EmittedRay sample_ray(Rng& rng) const;
   // One VPL that stands for the direct light of environment and extended emitters, where there are any.
   DirectSample sample_light(Rng& rng) const;
-  // What finds the light of an emissive mesh: samples stand for it where diffuse rays see it, and rays that leave a point
-  // that lights are sampled at find it too where glossy ones see it as well.
-  enum class MeshLight : uint8_t { by_samples, by_samples_and_rays, by_rays };
-  MeshLight mesh_light(uint32_t mesh) const;
-  // Whether such rays may find extended emitter i. Spheres and suns are not there for rays.
+  // Whether rays that leave a point that lights are sampled at may find extended emitter i. Spheres and suns are not there
+  // for rays.
   bool found_by_rays(size_t i) const { return found_by_rays(sampler_[extended_ + i]); }
   // Density with which sample_light draws a place on an emissive mesh, on a rectangle or disk, for each unit of area, and
   // a direction towards the environment, for each steradian.

@@ -21,8 +21,8 @@ struct LightPath {
   Rng rng;
   uint32_t met = 0;  // surfaces
   Rgb absorption{};  // on its way, for each unit of length
-  uint32_t kind =
-      kDiffuseRay | kShadowRay;  // of its ray: the first one is both what a light sample meets and what is seen
+  // RayKind: the first ray meets what stops samples of its light, and what is seen.
+  uint32_t kind = kDiffuseRay | kShadowRay;
 };
 
 // A VPL with the light path it came from, to keep the order of paths whatever the order of work.
@@ -58,13 +58,11 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
       if ((seen_by & kDiffuseRay) == 0) continue;  // it stops the light, and nobody sees it
       const SurfaceInteraction at = scene.interaction(rays[i]);
       path.flux *= at.bsdf.transmittance_to(at.t, path.absorption);
-      if ((seen_by & path.kind & kShadowRay) == 0 && (path.kind & kShadowRay) != 0) {
+      if ((path.kind & ~seen_by & kShadowRay) != 0) {
         // Lit, and no shadow behind it: half of the paths stay, half go on.
         path.flux = path.flux * 2.0f;
         if (path.rng.next_float() < 0.5f) {
-          path.origin = rays[i].ray.org + rays[i].ray.dir * at.t;
-          path.origin += dot(path.direction, at.geometric_normal) < 0.0f ? at.geometric_normal * -at.offset
-                                                                         : at.geometric_normal * at.offset;
+          path.origin = at.bsdf.origin(kTransmitted);
           paths[alive] = path, ids[alive++] = ids[i];
           continue;
         }

@@ -57,7 +57,7 @@ void ClampCompensation::find_surface(Search& search, size_t ray, TracedPoints& h
   const Rgb weight = c.weight * at.bsdf.transmittance_to(at.t, c.absorption);
   const float distance = c.travelled + at.t;
   if (max_component(at.emitted) > 0.0f) {
-    const float share = (scene_.meshes()[at.mesh].mask & kDiffuseRay) == 0 ? 1.0f  // no light stands for it
+    const float share = mesh_light(scene_.meshes()[at.mesh]) == MeshLight::by_rays ? 1.0f
                         : nearby_ != nullptr ? nearby_->triangle_share(c.from, r.hit, distance, c.pdf)
                                              : lost_at(search, at.position, distance);
     if (share > 0.0f) hits.add(at.emitted * weight * share, c.pixel, scene_.meshes()[at.mesh].group);

@@ -73,7 +73,7 @@ float NearbyLights::light_share(const Vec3f& origin, uint32_t light, float dista
 }
 
 float NearbyLights::triangle_share(const Vec3f& origin, const Hit& hit, float distance, float pdf) const {
-  if ((scene_.meshes()[hit.geom].mask & kGlossyRay) == 0) return 0.0f;  // lights are sampled as if no ray found it
+  if (mesh_light(scene_.meshes()[hit.geom]) == MeshLight::by_samples) return 0.0f;
   const NearLights::Found f = near_.find_triangle(origin, hit.geom, hit.prim, scene_.instance_of(hit), distance);
   return f.lost > 0.0f ? f.lost * power_heuristic(pdf, kSamples * f.density) : 0.0f;
 }

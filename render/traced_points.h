@@ -1,4 +1,5 @@
-// Points that camera rays and rays of compensation found, with what they show already multiplied in: their radiance adds to their pixels.
+// Points that camera rays and rays of compensation found, with what they show already multiplied in: their radiance
+// adds to their pixels.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// Kinds of rays, as bits of Ray::mask and Mesh::mask: a mesh is there for the rays that it has a bit in common with. They
-// are what Cycles calls the ray visibility of an object.
+// Kinds of rays, as bits of Ray::mask and Mesh::mask: a mesh is there for the rays that it has a bit in common with.
+// They are what Cycles calls the ray visibility of an object.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,8 @@ enum RayKind : uint32_t {
 };
 inline constexpr uint32_t kAllRays = kCameraRay | kDiffuseRay | kGlossyRay | kTransmissionRay | kShadowRay;
 
-// Of the ray that leaves a surface by a sample with such BsdfFlags; `before`: of the one that came, which goes on straight.
+// Of the ray that leaves a surface by a sample with such BsdfFlags; `before`: of the one that came, which goes on
+// straight.
 inline uint32_t ray_kind(uint32_t flags, uint32_t before = kDiffuseRay) {
   if ((flags & kStraight) != 0) return before;
   if ((flags & kTransmitted) != 0) return kTransmissionRay;

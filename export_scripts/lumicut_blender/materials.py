@@ -105,6 +105,7 @@ class Surface:
     burley: bool = False  # the diffuse part, of which coats take nothing
     tint: tuple = None    # of metal's edge, of what glass reflects
     absorption: tuple = None  # inside glass, 1/length
+    by_ray: bool = False      # other kinds of rays may see another
 
 
 def cut_of(factor, picture):
@@ -439,6 +440,7 @@ class Converted:
     values: library.Material
     pictures: dict
     mapping: Mapping
+    by_ray: bool = False  # other kinds of rays may see another
 
     def is_hole(self):
         """Whether no ray meets it."""
@@ -461,53 +463,53 @@ class Materials:
         self.images = images or Images(report, check)
         self.converted, self.pictures = [], []
         self._numbers, self._picture_numbers = {}, {}
-        self._by_ray = set()  # names of materials that Light Path parts
 
     def held_out(self, number):
         """Index of the same material as a hole to the camera."""
-        if (number, "held out") not in self._numbers:
-            self._numbers[number, "held out"] = len(self.converted)
+        return self._flagged(number, "holdout", library.HOLDOUT)
+
+    def _flagged(self, number, name, flag):
+        """Index of the same material with one flag more."""
+        if (number, name) not in self._numbers:
             base = self.converted[number]
             values = type(base.values).from_buffer_copy(base.values)
-            values.flags |= library.HOLDOUT
-            self.converted.append(dataclasses.replace(base, name=base.name + " (holdout)", values=values))
-        return self._numbers[number, "held out"]
+            values.flags |= flag
+            self._numbers[number, name] = self._add(dataclasses.replace(base, name=f"{base.name} ({name})", values=values))
+        return self._numbers[number, name]
+
+    def _add(self, converted):
+        self.converted.append(converted)
+        return len(self.converted) - 1
 
     def numbers(self, material, pane=lambda: False):
-        """Index of a Blender material for each kind of ray, in the order of library.RAYS; see number()."""
-        first = self.number(material, pane)
-        if material is None or material.name_full not in self._by_ray:
-            return (first,) * len(library.RAYS)
-        return (first, *(self.number(material, pane, ray) for ray in list(library.RAYS)[1:]))
-
-    def number(self, material, pane=lambda: False, ray="camera"):
-        """Index of a Blender material (None: the default grey) on a mesh, as a kind of ray sees it; `pane`: whether that is
-        a sheet or flat, asked of glass alone. Light goes straight through panes; bodies bend it."""
+        """Index of a Blender material (None: the default grey) for each kind of ray, in the order of library.RAYS; kinds
+        that see it alike have one. `pane`: whether the mesh is a sheet or flat, asked of glass alone. Light goes straight
+        through panes; bodies bend it."""
         key = None if material is None else material.name_full
-        if ray != "camera":
-            key = (key, ray)
         if key not in self._numbers:
+            self._numbers[key] = self._number_by_ray(material)
+        return tuple(self._on_mesh(number, pane) for number in self._numbers[key])
+
+    def _number_by_ray(self, material):
+        first = self._convert(material, "camera")
+        numbers = [self._add(first)]
+        if not first.by_ray:
+            return numbers * len(library.RAYS)
+        for ray in list(library.RAYS)[1:]:
             converted = self._convert(material, ray)
-            same = ray != "camera" and self.converted[self._numbers[key[0]]].is_same(converted)
-            self._numbers[key] = self._numbers[key[0]] if same else len(self.converted)
-            if not same:
-                if ray != "camera":
-                    converted.name += f" ({ray} rays)"
-                self.converted.append(converted)
-        number = self._numbers[key]
+            converted.name += f" ({ray} rays)"
+            known = [n for n in numbers if self.converted[n].is_same(converted)]
+            numbers.append(known[0] if known else self._add(converted))
+        return numbers
+
+    def _on_mesh(self, number, pane):
         values = self.converted[number].values
         if values.transmission <= 0 or values.flags & library.SHADOWS_PASS:
             return number
-        if not pane():
-            self.report.note(self.converted[number].name, "Glass bodies: lamps do not shine straight through them, their light passes along light paths alone")
-            return number
-        if (key, "pane") not in self._numbers:
-            self._numbers[key, "pane"] = len(self.converted)
-            values = type(values).from_buffer_copy(values)
-            values.flags |= library.SHADOWS_PASS
-            base = self.converted[number]
-            self.converted.append(dataclasses.replace(base, name=base.name + " (pane)", values=values))
-        return self._numbers[key, "pane"]
+        if pane():
+            return self._flagged(number, "pane", library.SHADOWS_PASS)
+        self.report.note(self.converted[number].name, "Glass bodies: lamps do not shine straight through them, their light passes along light paths alone")
+        return number
 
     def picture_number(self, picture):
         """1 + index among the scene's images."""
@@ -572,7 +574,7 @@ class Materials:
             if slot == "opacity":
                 picture = self._mask(picture)
             setattr(m, slot + "_texture", self.picture_number(picture))
-        return Converted(name, m, pictures, mapping)
+        return Converted(name, m, pictures, mapping, surface.by_ray)
 
     def _gloss(self, surface, name, m):
         """Values of the slots diffuse and specular, and of roughness and metallic where they are pictures; flags and
@@ -682,8 +684,6 @@ class Materials:
             reader.note("", "Displacement left out")
         # Outputs inside a group cannot be: the output stands in the tree itself.
         surface = reader.surface(output.inputs["Surface"])
-        if reader.by_ray:
-            self._by_ray.add(material.name_full)
         if output.inputs["Volume"].is_linked:
             if not output.inputs["Surface"].is_linked:
                 surface = Surface(opacity=ZERO, clear=True)  # no surface: rays pass
@@ -691,4 +691,4 @@ class Materials:
                 surface = dataclasses.replace(surface, absorption=tuple(volumes.absorption(reader, output.inputs["Volume"])))
             else:
                 reader.note("", "Volumes left out")
-        return surface, reader.normals, reader.heights
+        return dataclasses.replace(surface, by_ray=reader.by_ray), reader.normals, reader.heights

@@ -146,7 +146,7 @@ LIGHT_PATH = {
     "transmission": {"Is Transmission Ray", "Ray Depth", "Transmission Depth"},
     "shadow": {"Is Shadow Ray", "Ray Depth"},
 }
-LIGHT_PATH["known"] = {"Transparent Depth"}.union(*LIGHT_PATH.values())
+PATH_OUTPUTS = {"Transparent Depth"}.union(*LIGHT_PATH.values())  # that a kind of ray tells
 
 
 class Evaluator:
@@ -354,7 +354,7 @@ class Evaluator:
         self.by_ray = True
         if not self.all_rays:
             self.note("Light Path", "Nodes that depend on the ray, taken as for the camera's")
-        elif output.name not in LIGHT_PATH["known"]:
+        elif output.name not in PATH_OUTPUTS:
             self.note(f"Light Path: {output.name}", "Numbers of a ray's path taken as 0")
         return Value(1.0 if output.name in LIGHT_PATH[self.ray] else 0.0)
 

@@ -5,7 +5,6 @@ import numpy as np
 from .nodes import input_of
 
 SCATTERED = "Volumes that scatter, of which absorption inside glass is rendered alone"
-BY_PLACE = "Volumes that differ by place, taken as their mean"
 
 
 def absorption(reader, socket, stack=()):
@@ -18,7 +17,7 @@ def absorption(reader, socket, stack=()):
         return density_of(reader, node, stack) * np.maximum(0, 1 - colour_of(reader, node.inputs["Color"], stack))
     if kind == "PRINCIPLED_VOLUME":
         # The attributes are grids of volume objects; those of the default names multiply by 1 where there are none.
-        if constant(reader, node.inputs["Emission Strength"], stack) > 0 or constant(reader, node.inputs["Blackbody Intensity"], stack) > 0:
+        if any(reader.number(node.inputs[name], stack, "volume") > 0 for name in ("Emission Strength", "Blackbody Intensity")):
             reader.note("Principled Volume", "Volumes that emit, whose light is left out")
         # Cycles: the colour is scattered, and the root of the absorption colour counts.
         scattered = colour_of(reader, node.inputs["Color"], stack)
@@ -29,25 +28,18 @@ def absorption(reader, socket, stack=()):
     if kind == "ADD_SHADER":
         return sum(absorption(reader, node.inputs[i], stack) for i in (0, 1))
     if kind == "MIX_SHADER":
-        share = min(1.0, max(0.0, constant(reader, node.inputs[0], stack)))
+        share = min(1.0, max(0.0, reader.number(node.inputs[0], stack, "volume")))
         return (1 - share) * absorption(reader, node.inputs[1], stack) + share * absorption(reader, node.inputs[2], stack)
     reader.note(node.bl_label or kind, SCATTERED if kind in ("VOLUME_SCATTER", "SUBSURFACE_SCATTERING") else "Volumes left out")
     return np.zeros(3)
 
 
-def constant(reader, socket, stack):
-    value = reader.value(socket, stack)
-    if value.picture is not None:
-        reader.note("", BY_PLACE)
-    return value.scalar()
-
-
 def colour_of(reader, socket, stack):
     value = reader.value(socket, stack)
     if value.picture is not None:
-        reader.note("", BY_PLACE)
+        reader.note("volume", "Textures taken as their mean")
     return np.broadcast_to(np.asarray(value.mean(), float), 3)
 
 
 def density_of(reader, node, stack):
-    return max(0.0, constant(reader, input_of(node, "Density"), stack))
+    return max(0.0, reader.number(input_of(node, "Density"), stack, "volume"))

@@ -414,6 +414,17 @@ class MaterialTrees(unittest.TestCase):
         self.assertEqual([mesh.mask for mesh in self.data.meshes], [library.ALL_RAYS & ~library.GLOSSY_RAYS])
         self.assertFalse(any("Light Path" in n for n in notes))
 
+    def test_kinds_of_rays_that_see_alike_share_a_mesh(self):
+        m = h.material("Window")
+        mix = h.shader(m, "ShaderNodeMixShader")
+        path, seen, other = (m.node_tree.nodes.new("ShaderNode" + kind) for kind in ("LightPath", "Emission", "BsdfDiffuse"))
+        for source, target in ((path.outputs["Is Camera Ray"], 0), (other.outputs[0], 1), (seen.outputs[0], 2)):
+            m.node_tree.links.new(source, mix.inputs[target])
+        h.add_sphere(segments=8).data.materials.append(m)
+        data, _ = collected()
+        self.assertEqual([mesh.mask for mesh in data.meshes], [library.CAMERA_RAYS, library.ALL_RAYS & ~library.CAMERA_RAYS])
+        self.assertEqual(len(data.materials), 2)
+
     def test_what_is_not_glass_and_clear_to_shadow_rays_is_hidden_from_them(self):
         out, notes = self.window("Is Shadow Ray", kind="ShaderNodeBsdfDiffuse")
         self.assertEqual(out.flags & library.SHADOWS_PASS, 0)

@@ -202,7 +202,7 @@ class Rays(BesideCycles):
 
 class Absorption(BesideCycles):
     def test_glass_takes_the_light_of_the_way_through_it(self):
-        """A slab and a ball over an emissive floor, seen through both borders."""
+        """A slab over an emissive floor, seen through both borders."""
         h.add_plane(3, material=h.emission(1, (1, 1, 1)))
         for kind, inputs in (("VolumeAbsorption", {"Density": 1.5, "Color": (0.9, 0.5, 0.2, 1)}),
                              ("VolumePrincipled", {"Density": 2.0, "Color": (0, 0, 0, 1), "Absorption Color": (0.5, 0.2, 0.1, 1)})):

@@ -41,19 +41,13 @@ std::vector<double> region_means(const std::vector<Rgb>& image, uint32_t width, 
   return means;
 }
 
-double mean_of(const std::vector<Rgb>& image) {
-  double sum = 0;
-  for (const Rgb& c : image) sum += luminance(c) / static_cast<double>(image.size());
-  return sum;
-}
-
 TEST(PathTracer, RadianceInAFurnaceIsTheGeometricSum) {
   const auto scene = furnace(0.5f, 1.0f);
   const auto image =
       test::render(*scene, "path_tracer", {}, {{"samples", "64"}, {"max_depth", "64"}}, {.width = 32, .height = 24})
           .radiance;
   // 49,152 paths with a spread of about the mean: .5 % is one standard deviation.
-  EXPECT_NEAR(mean_of(image), 2.0, 0.03);
+  EXPECT_NEAR(test::mean_luminance(image), 2.0, 0.03);
 }
 
 TEST(PathTracer, DirectLightOfADiskIsTheClosedForm) {
@@ -78,7 +72,7 @@ TEST(PathTracer, DirectLightOfADiskIsTheClosedForm) {
   const auto image = test::render(*scene, "path_tracer", {}, {{"samples", "400"}}, {.width = 8, .height = 8}).radiance;
   // Irradiance below the middle of a Lambertian disk: π L r²/(r² + h²); radiance: albedo/π of it.
   const double expected = 0.5 / kPi * (kPi * 3.0 / (1 + 4));
-  EXPECT_NEAR(mean_of(image) / expected, 1.0, 0.01);  // 25,600 samples of 20 % spread: 0.13 %
+  EXPECT_NEAR(test::mean_luminance(image) / expected, 1.0, 0.01);  // 25,600 samples of 20 % spread: 0.13 %
 }
 
 // Emission seen by rays alone, by light samples alone and by both must agree.
@@ -163,10 +157,10 @@ TEST(Compensation, MirrorsMetalAndGlassShowWhatThePathTracerShows) {
                            .radiance;
     for (size_t i = 0; i < mean.size(); ++i) mean[i] += image[i] / float{kPasses};
   }
-  EXPECT_NEAR(mean_of(mean) / mean_of(truth), 1.0, test::trimmed_noise(0.015));
+  EXPECT_NEAR(test::mean_luminance(mean) / test::mean_luminance(truth), 1.0, test::trimmed_noise(0.015));
   const auto found = region_means(mean, 32, 24, 3), expected = region_means(truth, 32, 24, 3);
   for (size_t i = 0; i < found.size(); ++i)
-    EXPECT_NEAR(found[i], expected[i], test::trimmed_noise(0.03) * mean_of(truth))
+    EXPECT_NEAR(found[i], expected[i], test::trimmed_noise(0.03) * test::mean_luminance(truth))
         << "part " << i;  // caustics are noise in both: about 1 %
 }
 
@@ -189,32 +183,32 @@ TEST(Compensation, VirtualLightsMeanThePathTracersImage) {
     const auto full = test::render(*scene, "exhaustive", vpls, settings, options).radiance;
     for (size_t i = 0; i < mean.size(); ++i) mean[i] += full[i] / float{kPasses}, clamped[i] += cut[i] / float{kPasses};
   }
-  EXPECT_LT(mean_of(clamped) / mean_of(truth), 0.95);
-  EXPECT_NEAR(mean_of(mean) / mean_of(truth), 1.0, test::trimmed_noise(0.01));
+  EXPECT_LT(test::mean_luminance(clamped) / test::mean_luminance(truth), 0.95);
+  EXPECT_NEAR(test::mean_luminance(mean) / test::mean_luminance(truth), 1.0, test::trimmed_noise(0.01));
   const auto found = region_means(mean, 32, 24, 4), expected = region_means(truth, 32, 24, 4);
   for (size_t i = 0; i < found.size(); ++i)
-    EXPECT_NEAR(found[i], expected[i], test::trimmed_noise(0.025) * mean_of(truth))
+    EXPECT_NEAR(found[i], expected[i], test::trimmed_noise(0.025) * test::mean_luminance(truth))
         << "part " << i;  // noise of both: up to 0.8 %
 }
 
 // Spheres clamp nothing, so compensation brings the gloss alone: what is reflected evenly must not come twice.
 TEST(Compensation, SpheresMeanThePathTracersImageAsTheyShrink) {
   const auto scene = test::make_room();
-  const double truth = mean_of(test::render(*scene, "path_tracer", {},
-                                            {{"samples", std::to_string(test::trimmed(64))}, {"max_depth", "32"}},
-                                            {.width = 32, .height = 24, .samples = 64})
-                                   .radiance);
+  const double truth = test::mean_luminance(
+      test::render(*scene, "path_tracer", {}, {{"samples", std::to_string(test::trimmed(64))}, {"max_depth", "32"}},
+                   {.width = 32, .height = 24, .samples = 64})
+          .radiance);
   constexpr int kPasses = static_cast<int>(test::trimmed(12));
   const auto mean = [&](float scale, bool compensate) {
     double sum = 0;
     for (uint64_t pass = 0; pass < kPasses; ++pass)
-      sum += mean_of(test::render(*scene, "exhaustive", test::lights_of(*scene, 1000, 100 + pass, scale),
-                                  {{"clamp_distance", "0.35"},
-                                   {"compensate", compensate ? "true" : "false"},
-                                   {"virtual_lights", scale > 0.0f ? "spheres" : "points"},
-                                   {"seed", std::to_string(100 + pass)}},
-                                  {.width = 32, .height = 24, .samples = 2})
-                         .radiance);
+      sum += test::mean_luminance(test::render(*scene, "exhaustive", test::lights_of(*scene, 1000, 100 + pass, scale),
+                                               {{"clamp_distance", "0.35"},
+                                                {"compensate", compensate ? "true" : "false"},
+                                                {"virtual_lights", scale > 0.0f ? "spheres" : "points"},
+                                                {"seed", std::to_string(100 + pass)}},
+                                               {.width = 32, .height = 24, .samples = 2})
+                                      .radiance);
     return sum / kPasses / truth;
   };
   const double points = mean(0.0f, false), alone = mean(1.0f, false), full = mean(1.0f, true), small = mean(0.2f, true);

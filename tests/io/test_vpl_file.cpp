@@ -121,6 +121,44 @@ TEST(VplFile, RecordsWithOriginsAreCounted) {
   expect_in(error(header2(1, 1) + light + origin.substr(0, 8)), {"says 1 lights", "72 bytes"});
 }
 
+// By the library, in its words with the file's name.
+TEST(VplFile, WrongValuesAreNamedWithRecordAndField) {
+  const TemporaryFolder folder;
+  const api::Device device(1);
+  const api::Integrator integrator(device, "exhaustive");
+  const auto error = [&](const lumicut_vpl& light, const lumicut_vpl_origin& origin) {
+    const std::string path = folder.write("bad.vpl", header2(2, 1) + bytes_of(oriented(0)) +
+                                                         bytes_of(lumicut_vpl_origin{LUMICUT_SOURCE_AREA, 0.1f, 2}) +
+                                                         bytes_of(light) + bytes_of(origin));
+    return error_of([&] { upload_vpls(api::linked(), integrator.get(), read_vpls(path), path); });
+  };
+  const auto light = [&](auto change) {
+    lumicut_vpl bad = oriented(1);
+    change(bad);
+    return error(bad, {});
+  };
+  expect_in(light([](auto& l) { l.position[1] = NAN; }), {"bad.vpl", "lumicut_vpl[1].position", "nan"});
+  expect_in(light([](auto& l) { l.intensity[0] = -1; }), {"lumicut_vpl[1].intensity", "-1"});
+  expect_in(light([](auto& l) { l.intensity[0] = INFINITY; }), {"lumicut_vpl[1].intensity", "inf"});
+  expect_in(light([](auto& l) { l.normal[1] = 0; }), {"lumicut_vpl[1].normal", "length 0"});
+  expect_in(light([](auto& l) { l.kind = 9; }), {"lumicut_vpl[1].kind", "9"});
+  expect_in(light([](auto& l) { l.kind = LUMICUT_VPL_SPHERE, l.cos_outer = 0; }), {"lumicut_vpl[1].cos_outer", "0"});
+  expect_in(light([](auto& l) { l.kind = LUMICUT_VPL_SPOT, l.spread_tan = NAN; }),
+            {"lumicut_vpl[1].spread_tan", "nan"});
+  const auto spoilt = [&](auto change) {
+    lumicut_vpl_origin bad{};
+    change(bad);
+    return error(oriented(1), bad);
+  };
+  expect_in(spoilt([](auto& o) { o.source = 3; }), {"bad.vpl", "lumicut_vpl_origin[1].source", "3"});
+  expect_in(spoilt([](auto& o) { o.offset = NAN; }), {"lumicut_vpl_origin[1].offset", "nan"});
+  expect_in(spoilt([](auto& o) { o.offset = -1; }), {"lumicut_vpl_origin[1].offset", "-1"});
+  expect_in(spoilt([](auto& o) { o.area = 1; }), {"lumicut_vpl_origin[1].area", "1 is not 0"});
+  expect_in(spoilt([](auto& o) { o.source = LUMICUT_SOURCE_AREA; }), {"lumicut_vpl_origin[1].area", "is 0"});
+  expect_in(spoilt([](auto& o) { o.source = LUMICUT_SOURCE_AREA, o.area = INFINITY; }),
+            {"lumicut_vpl_origin[1].area", "inf"});
+}
+
 TEST(VplFile, NormalsAreBroughtToLengthOne) {
   const TemporaryFolder folder;
   lumicut_vpl light = oriented(0);

@@ -121,12 +121,6 @@ TEST(Mirror, OfOneSampleHasNoBlackPixel) {
     EXPECT_GT(luminance(c), 0.001f);
 }
 
-double mean_of(const std::vector<Rgb>& pixels) {
-  double sum = 0;
-  for (const Rgb& c : pixels) sum += luminance(c);
-  return sum / static_cast<double>(pixels.size());
-}
-
 class OfGlass : public testing::TestWithParam<Glass> {};
 INSTANTIATE_TEST_SUITE_P(Kinds, OfGlass,
                          testing::Values(Glass::none, Glass::sheet_out, Glass::sheet_in, Glass::slab, Glass::ball,
@@ -137,18 +131,9 @@ INSTANTIATE_TEST_SUITE_P(Kinds, OfGlass,
 TEST_P(OfGlass, CompensatedIterationsGiveThePathTracersImage) {
   const auto scene = make_glass(GetParam());
   const auto samples = [](uint32_t count) { return test::RenderOptions{.width = 24, .height = 18, .samples = count}; };
-  const double truth = mean_of(
+  const double truth = test::mean_luminance(
       test::render(*scene, "path_tracer", {}, {{"samples", "4"}}, samples(test::kSanitized ? 100 : 1024)).radiance);
-  constexpr uint64_t kIterations = test::trimmed(40);
-  double sum = 0, sum2 = 0;
-  for (uint64_t seed = 1; seed <= kIterations; ++seed) {
-    const double mean = mean_of(test::render(*scene, "exhaustive", test::lights_of(*scene, 200, seed),
-                                             {{"compensate", "true"}, {"seed", std::to_string(seed)}}, samples(8))
-                                    .radiance);
-    sum += mean, sum2 += mean * mean;
-  }
-  const double mean = sum / kIterations,
-               deviation = std::sqrt(std::max(0.0, sum2 / kIterations - mean * mean) / kIterations);
+  const auto [mean, deviation] = test::mean_of_iterations(*scene, test::trimmed(40), samples(8));
   RecordProperty("ratio", std::to_string(mean / truth) + " +- " + std::to_string(deviation / truth));
   // Sanitized: four iterations tell little of their own deviation, and the truth has a noise of 1 %.
   EXPECT_NEAR(mean / truth, 1.0, test::kSanitized ? 0.08 : 0.01 + 3 * deviation / truth);
@@ -157,9 +142,9 @@ TEST_P(OfGlass, CompensatedIterationsGiveThePathTracersImage) {
 // What a slab of parallel borders bends, it bends back; light is shifted by a little alone.
 TEST(StraightGlass, OfASlabLetsThroughAsMuchAsOneThatBends) {
   const auto mean = [](Glass kind) {
-    return mean_of(test::render(*make_glass(kind), "path_tracer", {}, {{"samples", "4"}},
-                                {.width = 24, .height = 18, .samples = test::kSanitized ? 100 : 1024})
-                       .radiance);
+    return test::mean_luminance(test::render(*make_glass(kind), "path_tracer", {}, {{"samples", "4"}},
+                                             {.width = 24, .height = 18, .samples = test::kSanitized ? 100 : 1024})
+                                    .radiance);
   };
   const double ratio = mean(Glass::straight_slab) / mean(Glass::slab);
   RecordProperty("ratio", std::to_string(ratio));
@@ -224,13 +209,12 @@ TEST(TintedGlass, ASunThroughASlabIsDimmedByBeersLaw) {
     return luminance(TintedSlab::mean(*scene, 1, 0.5f * size, 64, 1));
   };
   for (const float size : {1.0f, 0.5f, 2.0f}) {
-    double expected = 0;
     const double r = TintedSlab::kReflected;
     Rgb passed{};
     for (int k = 0; k < 3; ++k)
       passed[k] = static_cast<float>(
           (1 - r) * std::exp(-0.25 * size * TintedSlab::kAbsorption[k] * 8 * 8 / (8 * 8 + 2 * 8 * 0.5)));
-    expected = luminance(passed) * luminance(passed);  // a border at a time, by chance
+    const double expected = luminance(passed) * luminance(passed);  // a border at a time, by chance
     EXPECT_NEAR(lit(true, size) / lit(false, size), expected, 0.03) << size;
   }
 }

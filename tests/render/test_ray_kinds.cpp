@@ -45,12 +45,6 @@ std::vector<Rgb> render(const Scene& scene, const std::string& id = "exhaustive"
   return test::render(scene, id, lights, settings, {.width = kWidth, .height = kHeight}).radiance;
 }
 
-double mean_of(const std::vector<Rgb>& pixels) {
-  double sum = 0;
-  for (const Rgb& c : pixels) sum += luminance(c) / static_cast<double>(pixels.size());
-  return sum;
-}
-
 class RayKinds : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Accels, RayKinds, testing::Values("bvh", "embree"));
 
@@ -59,8 +53,9 @@ TEST_P(RayKinds, AMeshThatNoneSeesIsNotThere) {
   EXPECT_TRUE(render(*room(box(kOther), GetParam())) == render(*room({}, GetParam())));
   // Trees and random numbers at a point go by the size of the scene's parts, which a box changes.
   for (const char* id : {"lightcuts", "wspd", "stochastic_lightcuts", "path_tracer"})
-    EXPECT_NEAR(mean_of(render(*room(box(kOther), GetParam()), id)) / mean_of(render(*room({}, GetParam()), id)), 1,
-                0.05)
+    EXPECT_NEAR(test::mean_luminance(render(*room(box(kOther), GetParam()), id)) /
+                    test::mean_luminance(render(*room({}, GetParam()), id)),
+                1, 0.05)
         << id;
 }
 
@@ -150,20 +145,11 @@ TEST(RayKind, CompensatedIterationsGiveThePathTracersImage) {
         std::pair{"a lamp for camera and glossy rays", std::function<void(Scene&)>(lamp(kCameraRay | kGlossyRay))}}) {
     const auto scene = room(add);
     const double truth =
-        mean_of(test::render(*scene, "path_tracer", {}, {{"samples", "64"}},
-                             {.width = kWidth, .height = kHeight, .samples = test::kSanitized ? 2 : 16})
-                    .radiance);
-    constexpr uint64_t kIterations = test::trimmed(40);
-    double sum = 0, sum2 = 0;
-    for (uint64_t seed = 1; seed <= kIterations; ++seed) {
-      const double mean = mean_of(test::render(*scene, "exhaustive", test::lights_of(*scene, 200, seed),
-                                               {{"compensate", "true"}, {"seed", std::to_string(seed)}},
-                                               {.width = kWidth, .height = kHeight, .samples = 4})
-                                      .radiance);
-      sum += mean, sum2 += mean * mean;
-    }
-    const double mean = sum / kIterations,
-                 deviation = std::sqrt(std::max(0.0, sum2 / kIterations - mean * mean) / kIterations);
+        test::mean_luminance(test::render(*scene, "path_tracer", {}, {{"samples", "64"}},
+                                          {.width = kWidth, .height = kHeight, .samples = test::kSanitized ? 2 : 16})
+                                 .radiance);
+    const auto [mean, deviation] =
+        test::mean_of_iterations(*scene, test::trimmed(40), {.width = kWidth, .height = kHeight, .samples = 4});
     EXPECT_NEAR(mean / truth, 1.0, test::kSanitized ? 0.08 : 0.01 + 3 * deviation / truth) << name;
   }
 }

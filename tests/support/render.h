@@ -79,6 +79,29 @@ inline Image render(const Scene& scene, const std::string& id, const VplSet& vpl
   return image;
 }
 
+inline double mean_luminance(const std::vector<Rgb>& image) {
+  double sum = 0;
+  for (const Rgb& c : image) sum += luminance(c);
+  return sum / static_cast<double>(image.size());
+}
+
+// Over images of compensated virtual lights, and how far it is from what they converge to (one standard error).
+struct MeanOfIterations {
+  double mean, deviation;
+};
+inline MeanOfIterations mean_of_iterations(const Scene& scene, uint64_t iterations, const RenderOptions& options) {
+  double sum = 0, sum2 = 0;
+  for (uint64_t seed = 1; seed <= iterations; ++seed) {
+    const double mean = mean_luminance(render(scene, "exhaustive", lights_of(scene, 200, seed),
+                                              {{"compensate", "true"}, {"seed", std::to_string(seed)}}, options)
+                                           .radiance);
+    sum += mean, sum2 += mean * mean;
+  }
+  const auto n = static_cast<double>(iterations);
+  const double mean = sum / n;
+  return {mean, std::sqrt(std::max(0.0, sum2 / n - mean * mean) / n)};
+}
+
 // Mean of |luminance − reference| over max(reference, a thousandth of its mean).
 inline double mean_relative_error(const std::vector<Rgb>& image, const std::vector<Rgb>& reference) {
   double mean = 0, sum = 0;

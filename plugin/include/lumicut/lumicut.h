@@ -171,7 +171,7 @@ enum {
 
 typedef struct lumicut_mesh {
   uint32_t struct_size;
-  uint32_t mask;              /* LUMICUT_CAMERA_RAYS ...: the kinds of rays that see it, as masks of rays are; 0: all */
+  uint32_t mask;              /* LUMICUT_CAMERA_RAYS ...: the kinds of rays that see it; 0: all */
   const float* positions;     /* xyz */
   const float* normals;       /* xyz a vertex, for shading; NULL: flat */
   const float* uvs;           /* uv a vertex; NULL: 0 */
