@@ -582,6 +582,9 @@ FrameOptions to_frame_options(const lumicut_render_desc& in) {
   return o;
 }
 
+// More than the state of the largest image that hosts can ask for in the memory of any machine.
+constexpr uint64_t kMostCheckpointBytes = (uint64_t{1} << 40) - 1;
+
 IterationOptions to_pass_options(const lumicut_render_desc& in) {
   const FieldValidator c("lumicut_render_desc");
   c.not_negative("max_seconds", in.max_seconds);
@@ -589,6 +592,7 @@ IterationOptions to_pass_options(const lumicut_render_desc& in) {
   c.range("confidence", in.confidence, 0.0f, 0.999999f);
   c.flags("flags", in.flags, LUMICUT_CHECKPOINTS | LUMICUT_ILLUMINANCE | LUMICUT_GROUPS);
   if (in.checkpoint != nullptr && in.checkpoint_size == 0) c.fail("checkpoint_size", "0 bytes are no checkpoint");
+  c.integer("checkpoint_size", in.checkpoint_size, 0, kMostCheckpointBytes);
   if (in.checkpoint == nullptr && in.checkpoint_size != 0)
     c.fail("checkpoint", "is NULL, but checkpoint_size is " + number_text(in.checkpoint_size));
   IterationOptions o;

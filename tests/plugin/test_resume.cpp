@@ -275,7 +275,7 @@ TEST(Resume, DoesNotDependOnThreadsNorOnWhatWasBefore) {
   EXPECT_EQ(refusal(device, host, from), "");
 }
 
-TEST(Resume, OfNoBytesIsRefused) {
+TEST(Resume, OfNoBytesAndOfMoreThanAnyMemoryIsRefused) {
   const api::Device device(1);
   const Host host;
   const api::Scene s = host.scene(device);
@@ -284,6 +284,9 @@ TEST(Resume, OfNoBytesIsRefused) {
   f.checkpoint = "";
   lumicut_render render = nullptr;
   EXPECT_CODE(lumicut_render_start(i.get(), s.get(), &f, &render), LUMICUT_INVALID_ARGUMENT, "checkpoint_size");
+  f.checkpoint_size = uint64_t{1} << 59;  // unread: there is no such memory
+  EXPECT_CODE(lumicut_render_start(i.get(), s.get(), &f, &render), LUMICUT_INVALID_ARGUMENT,
+              "checkpoint_size: 576460752303423488");
 }
 
 TEST(Resume, OfAllPassesGivesTheImageAndItsLights) {
