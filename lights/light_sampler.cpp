@@ -205,7 +205,9 @@ double LightSampler::area_density(double emission) const {
 
 MeshLight mesh_light(const Mesh& mesh) {
   if ((mesh.mask & kDiffuseRay) == 0) return MeshLight::by_rays;
-  return (mesh.mask & kGlossyRay) != 0 ? MeshLight::by_samples_and_rays : MeshLight::by_samples;
+  // Samples pass what casts no shadow, and rays stop at the first of such surfaces: the two would not be weighted alike.
+  constexpr uint32_t kByRays = kGlossyRay | kShadowRay;
+  return (mesh.mask & kByRays) == kByRays ? MeshLight::by_samples_and_rays : MeshLight::by_samples;
 }
 
 bool LightSampler::found_by_rays(const Emitter& e) const {

@@ -14,7 +14,7 @@
 namespace lumicut {
 
 // What finds the light of an emissive mesh: samples stand for it where diffuse rays see it, and rays that leave a point
-// that lights are sampled at find it too where glossy ones see it as well.
+// that lights are sampled at find it too where glossy and shadow rays see it as well.
 enum class MeshLight : uint8_t { by_samples, by_samples_and_rays, by_rays };
 MeshLight mesh_light(const Mesh& mesh);
 

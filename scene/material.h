@@ -43,6 +43,8 @@ struct Material {
                  height_texture, roughness_texture, metallic_texture, diffuse_texture, specular_texture,
                  opacity_texture, emission_texture, translucency_texture)
 
+  // Whether light that goes straight through its glass is absorbed there.
+  bool absorbs_straight() const { return shadows_pass && max_component(absorption) > 0.0f; }
   bool translucent() const { return max_component(translucency) > 0.0f; }
   bool emissive() const { return max_component(emission) > 0.0f; }
   float coat_alpha() const { return coat_roughness * coat_roughness; }

@@ -123,11 +123,12 @@ void Scene::set_materials(std::vector<Material> materials) {
 namespace {
 
 // Mean way through a closed mesh, 2·volume/area: a slab's thickness. By it and a slab's slant the mean over all directions
-// is the mean chord of any convex body, 4·volume/area [Cauchy]. 0 for a mesh that is not closed, whose faces do not cancel.
-float thickness_of(const Mesh& mesh) {
+// is the mean chord of any convex body, 4·volume/area [Cauchy]. Of the faces that absorb alone; 0 where they are not closed: do not cancel.
+float thickness_of(const Mesh& mesh, const std::vector<Material>& materials) {
   double volume = 0, area = 0;
   Vec3d sum{};
   for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+    if (!materials[mesh.material_of(static_cast<uint32_t>(i / 3))].absorbs_straight()) continue;
     const auto corner = [&](size_t k) {
       const Vec3f p = mesh.positions[mesh.indices[i + k]] - mesh.positions[mesh.indices[0]];
       return Vec3d{p.x, p.y, p.z};
@@ -250,13 +251,13 @@ void Scene::commit(Progress& progress) {
     bool cutout = false, passes_light = false, absorbs = false;
     const auto meet = [&](const Material& material) {
       cutout = cutout || material.cutout(), passes_light = passes_light || material.shadows_pass;
-      absorbs = absorbs || (material.shadows_pass && max_component(material.absorption) > 0.0f);
+      absorbs = absorbs || material.absorbs_straight();
     };
     if (mesh.triangle_materials.empty() && mesh.triangle_count() > 0) meet(materials_[mesh.material]);
     for (uint32_t material : mesh.triangle_materials) meet(materials_[material]);
     geometry.meshes.push_back({mesh.positions.data(), mesh.positions.size(), mesh.indices.data(), mesh.triangle_count(),
                                mesh.mask, cutout, passes_light});
-    if (absorbs) thickness[m] = thickness_of(mesh);
+    if (absorbs) thickness[m] = thickness_of(mesh, materials_);
     first_instance.push_back(static_cast<uint32_t>(geometry.instances.size()));
     for (uint32_t i = 0; i < instance_count(m); ++i) {
       const Transform& t = instance(m, i);

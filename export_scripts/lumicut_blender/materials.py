@@ -688,6 +688,7 @@ class Materials:
             if not output.inputs["Surface"].is_linked:
                 surface = Surface(opacity=ZERO, clear=True)  # no surface: rays pass
             if luminance(surface.glass) > 0:
+                reader.ray = "transmission"  # those are the rays inside
                 surface = dataclasses.replace(surface, absorption=tuple(volumes.absorption(reader, output.inputs["Volume"])))
             else:
                 reader.note("", "Volumes left out")

@@ -154,6 +154,24 @@ TEST(RayKind, CompensatedIterationsGiveThePathTracersImage) {
   }
 }
 
+// Light samples pass all of them, and so no ray may bring any: four sheets give four times the light of one.
+TEST(RayKind, LampsThatCastNoShadowShineThroughEachOther) {
+  const auto lit = [](int sheets) {
+    return test::mean_luminance(render(*room([=](Scene& scene) {
+      Mesh mesh;
+      for (int k = 0; k < sheets; ++k) {
+        const float z = 0.6f + 0.01f * static_cast<float>(k);
+        test::add_quad(mesh, {-0.2f, 0.2f, z}, {0.2f, 0.2f, z}, {0.2f, -0.2f, z}, {-0.2f, -0.2f, z}, 1);
+      }
+      mesh.mask = kDiffuseRay | kGlossyRay;
+      scene.add_mesh(std::move(mesh));
+    }),
+                                       "path_tracer", {{"samples", "400"}}));
+  };
+  const double none = lit(0), one = lit(1) - none, four = lit(4) - none;
+  EXPECT_NEAR(four / one, 4.0, 0.3);  // bounced light stops at the sheets: a few per cent
+}
+
 // Of the light of a lamp without extent alone: what casts no shadow lights what is behind it, and is lit.
 TEST(RayKind, LightPathsPassWhatCastsNoShadow) {
   const auto flux = [](uint32_t mask) {

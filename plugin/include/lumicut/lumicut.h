@@ -145,7 +145,7 @@ typedef struct lumicut_material {
   /* LUMICUT_GGX alone */
   float specular_tint[3];      /* 0..1: of metal at 82 degrees, over its colour there; of what glass reflects; all 0: not given, taken as 1 */
   float absorption[3];         /* 0 or above, 1/length: light inside closed glass falls by exp(-absorption times the way); shadow rays that pass
-                                  straight know the mesh's mean thickness alone, 2 volume / area */
+                                  straight know the mean thickness of the mesh's absorbing faces alone, 2 volume / area */
 } lumicut_material;
 enum {
   LUMICUT_EMIT_BOTH_SIDES = 1,
