@@ -85,7 +85,6 @@ struct AccelGeometry {
   std::vector<MeshView> meshes;
   std::vector<InstanceView> instances;  // empty: each mesh once, as it is
   const HitFilter* filter = nullptr;
-  uint32_t point_mask = 0xffffffffu;  // of the rays of Accel::occluded_from_point
 };
 
 struct AccelOptions {
@@ -100,6 +99,13 @@ struct AccelInfo {
   Aabb bounds;
 };
 
+// Where all rays of a bundle begin: a point, or the unit direction towards a light at infinity.
+struct BundleOrigin {
+  Vec3f light;
+  bool directional = false;
+  uint32_t mask = 0xffffffffu;  // as Ray::mask
+};
+
 class Accel {
  public:
   virtual ~Accel() = default;
@@ -112,11 +118,10 @@ class Accel {
   virtual void occluded(std::span<Ray> rays) const = 0;
 
   // The hot call of the renderer: one light, many nearby points (structure of arrays). Tests the open segments
-  // light→point; with `directional`, `light` is the unit direction towards the light and the ray runs from the point to
-  // infinity. Both ends should be offset from their surfaces already. occluded[i] = 1 where blocked, else 0. Fastest
+  // light→point; with `directional` the ray runs from the point to infinity. Both ends should be offset from their surfaces already. occluded[i] = 1 where blocked, else 0. Fastest
   // where `n` is a multiple of 16.
-  virtual void occluded_from_point(const Vec3f& light, bool directional, const float* px, const float* py,
-                                   const float* pz, size_t n, uint8_t* occluded) const = 0;
+  virtual void occluded_from_point(const BundleOrigin& origin, const float* px, const float* py, const float* pz,
+                                   size_t n, uint8_t* occluded) const = 0;
 };
 
 inline constexpr const char* kDefaultAccel = "bvh";

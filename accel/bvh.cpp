@@ -101,7 +101,6 @@ std::unique_ptr<Bvh> Bvh::from_geometry(const AccelGeometry& geometry, const Acc
   bvh->scene_.filter = filters ? geometry.filter : nullptr;
   bvh->scene_.filtered = bvh->filtered_.data();
   bvh->scene_.mesh_masks = bvh->mesh_masks_.data();
-  bvh->scene_.point_mask = geometry.point_mask;
   AccelInfo& info = bvh->info_;
   if (geometry.instances.empty()) {
     std::vector<uint32_t> all(geometry.meshes.size());

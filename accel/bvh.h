@@ -28,9 +28,9 @@ class Bvh final : public Accel {
   AccelInfo info() const override { return info_; }
   void intersect(std::span<RayHit> rays) const override { trace_closest(scene_, rays); }
   void occluded(std::span<Ray> rays) const override { trace_any(scene_, rays); }
-  void occluded_from_point(const Vec3f& light, bool directional, const float* px, const float* py, const float* pz,
-                           size_t n, uint8_t* out) const override {
-    trace_points(scene_, light, directional, px, py, pz, n, out);
+  void occluded_from_point(const BundleOrigin& origin, const float* px, const float* py, const float* pz, size_t n,
+                           uint8_t* out) const override {
+    trace_points(scene_, origin, px, py, pz, n, out);
   }
 
   // The binary tree: node 0 is the root, children are adjacent (TreeNode::first, first + 1), and a leaf's

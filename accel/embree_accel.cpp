@@ -93,7 +93,7 @@ class EmbreeAccel final : public Accel {
  public:
   EmbreeAccel(const AccelGeometry& geometry, const AccelOptions& options, Progress* progress) {
     const auto start = std::chrono::steady_clock::now();
-    state_.progress = progress, point_mask_ = geometry.point_mask;
+    state_.progress = progress;
     // No threads of Embree's own: the build runs on the caller's arena. No cache for tessellation, which is not used:
     // if its allocation fails, Embree never releases a lock that the next device waits for.
     device_ = rtcNewDevice("start_threads=0,set_affinity=0,tessellation_cache_size=0");
@@ -151,8 +151,9 @@ class EmbreeAccel final : public Accel {
     }
   }
 
-  void occluded_from_point(const Vec3f& light, bool directional, const float* px, const float* py, const float* pz,
-                           size_t n, uint8_t* out) const override {
+  void occluded_from_point(const BundleOrigin& origin, const float* px, const float* py, const float* pz, size_t n,
+                           uint8_t* out) const override {
+    const auto& [light, directional, mask] = origin;
     embree::Context context(coherent_);
     constexpr size_t kWidth = 16;
     Packet<kWidth> packet;
@@ -162,7 +163,7 @@ class EmbreeAccel final : public Accel {
     for (size_t i = 0; i < kWidth; ++i) {
       for (int axis = 0; axis < 3; ++axis) packet.org[axis][i] = packet.dir[axis][i] = light[axis];
       packet.tnear[i] = packet.time[i] = 0.0f;
-      packet.mask[i] = point_mask_, packet.id[i] = packet.flags[i] = 0;
+      packet.mask[i] = mask, packet.id[i] = packet.flags[i] = 0;
     }
     const float reach = directional ? std::numeric_limits<float>::infinity() : 0x1.fffffep-1f;
     for (size_t begin = 0; begin < n; begin += kWidth) {
@@ -321,7 +322,6 @@ class EmbreeAccel final : public Accel {
   // Embree 3.13.5 reads the octants of a coherent packet's rays from uninitialised stack memory (AVX-512) and may not
   // terminate.
   bool coherent_ = false;
-  uint32_t point_mask_ = 0xffffffffu;
   RayLimits limits_;
   std::vector<RTCScene> scenes_;
   std::vector<FilterUser> filters_;

@@ -52,15 +52,16 @@ class HostAccel final : public Accel {
     if (passes_light_) pass_light(asked, rays);
   }
 
-  void occluded_from_point(const Vec3f& light, bool directional, const float* px, const float* py, const float* pz,
-                           size_t n, uint8_t* out) const override {
+  void occluded_from_point(const BundleOrigin& origin, const float* px, const float* py, const float* pz, size_t n,
+                           uint8_t* out) const override {
+    const auto& [light, directional, mask] = origin;
     if (n == 0) return;
     std::vector<Ray> rays(n);
     for (size_t i = 0; i < n; ++i) {
       const Vec3f p{px[i], py[i], pz[i]};
       rays[i].org = directional ? p : light;
       rays[i].dir = directional ? light : p - light;
-      rays[i].tfar = directional ? kInf : 0x1.fffffep-1f, rays[i].mask = geometry_.point_mask;
+      rays[i].tfar = directional ? kInf : 0x1.fffffep-1f, rays[i].mask = mask;
     }
     HostAccel::occluded(rays);
     for (size_t i = 0; i < n; ++i) out[i] = rays[i].tfar == -kInf;

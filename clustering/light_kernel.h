@@ -51,12 +51,16 @@ void light_points(const Vpl& light, const Rgb& intensity, Falloff falloff, const
                   size_t count, LitPoints& lit, const uint16_t* lanes = nullptr,
                   const DirectionScatter* scatter = nullptr);
 
+// Where its shadow rays begin.
+inline BundleOrigin shadow_origin(const Vpl& light) {
+  const bool directional = light.kind == VplKind::directional;
+  return {directional ? -light.normal : light.position, directional, light.ray_mask};
+}
+
 // Shadow rays from the light to the lit points; fills `occluded`.
 inline void trace_lit(const Accel& accel, const Vpl& light, LitPoints& lit) {
   if (lit.count == 0) return;
-  const bool directional = light.kind == VplKind::directional;
-  accel.occluded_from_point(directional ? -light.normal : light.position, directional, lit.x, lit.y, lit.z, lit.count,
-                            lit.occluded);
+  accel.occluded_from_point(shadow_origin(light), lit.x, lit.y, lit.z, lit.count, lit.occluded);
 }
 
 // The same for one point, in plain arithmetic: what the kernel is tested against, and for code that is not hot.

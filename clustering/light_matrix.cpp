@@ -35,11 +35,15 @@ struct Tile {
   alignas(64) float x[kTile], y[kTile], z[kTile];
   uint32_t index[kTile];
   uint8_t occluded[kTile];
+  std::vector<uint32_t> masks;  // of the rays to its lights
 
   uint64_t fill(const Scene& scene, const Vpl* lights, size_t count, const ShadePoints& rows, Falloff falloff,
                 float shadowed_share, const Progress& progress) {
     uint64_t rays = 0;
     values.assign(rows.size() * kTile, 0.0f);
+    masks.clear();
+    for (size_t l = 0; l < count; ++l)
+      if (std::find(masks.begin(), masks.end(), lights[l].ray_mask) == masks.end()) masks.push_back(lights[l].ray_mask);
     for (size_t l = 0; l < count; ++l) {
       if (l % 16 == 0 && progress.cancelled()) return rays;
       for (size_t first = 0; first < rows.size(); first += kMaxLit) {
@@ -58,17 +62,20 @@ struct Tile {
     for (size_t r = 0; r < rows.size(); ++r) {
       if (r % 16 == 0 && progress.cancelled()) return rays;
       float* row = values.data() + r * kTile;
-      size_t n = 0;
-      for (size_t l = 0; l < count; ++l) {
-        if (row[l] == 0.0f || lights[l].kind == VplKind::directional) continue;
-        x[n] = lights[l].position.x, y[n] = lights[l].position.y, z[n] = lights[l].position.z;
-        index[n++] = static_cast<uint32_t>(l);
+      for (const uint32_t mask : masks) {
+        size_t n = 0;
+        for (size_t l = 0; l < count; ++l) {
+          const Vpl& v = lights[l];
+          if (row[l] == 0.0f || v.kind == VplKind::directional || v.ray_mask != mask) continue;
+          x[n] = v.position.x, y[n] = v.position.y, z[n] = v.position.z;
+          index[n++] = static_cast<uint32_t>(l);
+        }
+        if (n == 0) continue;
+        scene.accel().occluded_from_point({rows.position_at(r), false, mask}, x, y, z, n, occluded);
+        for (size_t i = 0; i < n; ++i)
+          if (occluded[i]) row[index[i]] *= shadowed_share;
+        rays += n;
       }
-      if (n == 0) continue;
-      scene.accel().occluded_from_point(rows.position_at(r), false, x, y, z, n, occluded);
-      for (size_t i = 0; i < n; ++i)
-        if (occluded[i]) row[index[i]] *= shadowed_share;
-      rays += n;
     }
     return rays;
   }

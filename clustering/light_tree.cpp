@@ -1,5 +1,6 @@
 #include "clustering/light_tree.h"
 
+#include <map>
 #include <numeric>
 
 #include "clustering/light_policy.h"
@@ -133,11 +134,11 @@ LightTree LightTree::build(const std::vector<Vpl>& lights, const Options& option
   progress.begin("light tree", lights.size());
   LightTree tree;
   tree.slots_.resize(std::max(1u, options.representatives) - 1);
-  for (int kind = 0; kind < kVplKinds; ++kind) {
-    std::vector<uint32_t> members;
-    for (uint32_t i = 0; i < lights.size(); ++i)
-      if (static_cast<int>(lights[i].kind) == kind && max_component(lights[i].intensity) > 0.0f) members.push_back(i);
-    if (!members.empty()) tree.add_kind(lights, members, options, progress);
+  std::map<std::pair<VplKind, uint32_t>, std::vector<uint32_t>> kinds;  // and by what stops them
+  for (uint32_t i = 0; i < lights.size(); ++i)
+    if (max_component(lights[i].intensity) > 0.0f) kinds[{lights[i].kind, lights[i].ray_mask}].push_back(i);
+  for (const auto& [kind, members] : kinds) {
+    tree.add_kind(lights, members, options, progress);
     progress.advance(members.size());
   }
   return tree;

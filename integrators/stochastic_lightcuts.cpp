@@ -147,7 +147,7 @@ class StochasticLightcuts final : public Integrator {
       if (!(max_component(given) > 0.0f)) continue;
       // As all methods trace them: from the light.
       Ray ray;
-      ray.mask = kShadowRay;
+      ray.mask = light.ray_mask;
       if (light.kind == VplKind::directional) {
         ray.org = point.position, ray.dir = -light.normal;
       } else {

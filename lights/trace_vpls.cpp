@@ -202,9 +202,12 @@ VplSet trace_vpls(const Scene& scene, const LightSampler& emitters, const VplOpt
 
 VplSet off_surfaces(const VplSet& set, const Scene& scene) {
   VplSet moved = set;
+  const size_t direct = set.light_paths > 0 ? set.direct : set.lights.size();
+  const uint32_t scattered = scene.scattered_ray_mask();
   parallel_chunks(moved.lights.size(), 4096, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       Vpl& v = moved.lights[i];
+      if (i >= direct) v.ray_mask = scattered;
       if (v.kind != VplKind::oriented && v.kind != VplKind::sphere) continue;
       if (!(v.offset > 0.0f)) v.offset = offset_on_surface(scene, v.position, v.normal);
       v.position += v.normal * v.offset;

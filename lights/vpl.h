@@ -7,6 +7,7 @@
 #include "core/fields.h"
 #include "core/vec.h"
 #include "scene/light_profile.h"
+#include "scene/ray_kind.h"
 
 namespace lumicut {
 
@@ -27,12 +28,14 @@ struct Vpl {
   // Spot: id of a LightProfile [scene/light_profile.h] in place of the falloff above; then blend_cosine, spot_cosine and
   // spread_tan are the unit vector where its horizontal angle 0 lies, and intensity is that of its largest value.
   uint32_t profile = 0;
+  // RayKind: of the rays that look for what stands before it. Bounced light comes with a ray that scattered at the point.
+  uint32_t ray_mask = kShadowRay;
   // What a host may not know; found from where the light lies.
   float offset = 0.0f;  // how far shadow rays that start at it stand off its surface
   float cell = 0.0f;    // m² of surface that it stands for; 0: exactly its point, or distant
   float clamp2 = 0.0f;  // squared distance below which no point comes nearer
   LUMICUT_FIELDS(Vpl, position, kind, normal, group, intensity, edge_or_radius, blend_cosine, spot_cosine, spread_tan,
-                 profile, offset, cell, clamp2)
+                 profile, ray_mask, offset, cell, clamp2)
 
   // Spot: the cosine at which it has fallen to 0.
   float cos_outer() const { return edge_or_radius; }

@@ -27,9 +27,9 @@ class HostTrace final : public Accel {
   AccelInfo info() const override { return inner_->info(); }
   void intersect(std::span<RayHit> rays) const override { inner_->intersect(rays); }
   void occluded(std::span<Ray> rays) const override { inner_->occluded(rays); }
-  void occluded_from_point(const Vec3f& light, bool directional, const float* px, const float* py, const float* pz,
-                           size_t n, uint8_t* occluded) const override {
-    inner_->occluded_from_point(light, directional, px, py, pz, n, occluded);
+  void occluded_from_point(const BundleOrigin& origin, const float* px, const float* py, const float* pz, size_t n,
+                           uint8_t* occluded) const override {
+    inner_->occluded_from_point(origin, px, py, pz, n, occluded);
   }
 
  private:

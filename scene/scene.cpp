@@ -277,7 +277,6 @@ void Scene::commit(Progress& progress) {
       boxes.push_back(box), bounds.extend(box);
     }
   }
-  geometry.point_mask = kShadowRay;
   SceneExtent extent(std::move(boxes));
 
   auto accel =
@@ -291,6 +290,13 @@ void Scene::commit(Progress& progress) {
   committed_ = true;
   ++version_;
   progress.advance(1);
+}
+
+uint32_t Scene::scattered_ray_mask() const {
+  const bool differ = std::any_of(meshes_.begin(), meshes_.end(), [](const Mesh& m) {
+    return ((m.mask & kDiffuseRay) != 0) != ((m.mask & kShadowRay) != 0);
+  });
+  return differ ? kDiffuseRay : kShadowRay;
 }
 
 const Transform& Scene::instance(uint32_t mesh, uint32_t index) const {

@@ -108,6 +108,9 @@ class Scene final : private HitFilter {
   // serves where a picture could feel that.
   float radius() const { return radius_; }
   const SceneExtent& extent() const { return extent_; }
+  // RayKind of the shadow rays of bounced light: it comes with a scattered ray, which may see other meshes than one
+  // that asks for a lamp. As theirs where no mesh tells the two apart.
+  uint32_t scattered_ray_mask() const;
   // How far ray ends stand off a place whose triangle is not known, such as a host's own point.
   float offset_at(const Vec3f& position) const;
 

@@ -110,7 +110,7 @@ class BundleTracer {
       r.org = {bundle_.origin[0][i], bundle_.origin[1][i], bundle_.origin[2][i]}, r.dir = bundle_.common;
     else
       r.org = bundle_.common, r.dir = {bundle_.dir[0][i], bundle_.dir[1][i], bundle_.dir[2][i]};
-    r.tfar = bundle_.tfar, r.mask = scene_.point_mask;
+    r.tfar = bundle_.tfar, r.mask = bundle_.mask;
     return r;
   }
 
@@ -205,7 +205,7 @@ class BundleTracer {
     uint32_t unseen = 0;  // lanes
     if constexpr (C::kMasks)
       for (int lane = 0; lane < 4 && block.prim[lane] != kNoId; ++lane)
-        if ((scene_.mesh_masks[block.geom[lane]] & scene_.point_mask) == 0) unseen |= 1u << lane;
+        if ((scene_.mesh_masks[block.geom[lane]] & bundle_.mask) == 0) unseen |= 1u << lane;
     return C::kRobust ? bundle_triangles_robust<C::kMasks>(block, bundle_, max_dir_, rays, unseen)
                       : bundle_triangles_fast<C::kMasks>(block, bundle_, rays, unseen);
   }
@@ -223,7 +223,7 @@ class BundleTracer {
     const TraceScene::Instance& in = scene_.instances[index];
     Bundle local;
     local.common = kDirectional ? local_vector(in, bundle_.common) : local_point(in, bundle_.common);
-    local.tfar = bundle_.tfar;
+    local.tfar = bundle_.tfar, local.mask = bundle_.mask;
     local.active = rays;
     for (size_t i = 0; i < kBundle; ++i) {
       if constexpr (kDirectional) {
@@ -250,10 +250,11 @@ class BundleTracer {
 
 // See trace_points.
 template <class C, bool kDirectional>
-HWY_NOINLINE void trace_points_in_bundles(const TraceScene& scene, const Vec3f& light, const float* px, const float* py,
-                                          const float* pz, size_t n, uint8_t* occluded) {
+HWY_NOINLINE void trace_points_in_bundles(const TraceScene& scene, const BundleOrigin& origin, const float* px,
+                                          const float* py, const float* pz, size_t n, uint8_t* occluded) {
   Bundle bundle;
-  bundle.common = light;
+  const Vec3f light = origin.light;
+  bundle.common = light, bundle.mask = origin.mask;
   bundle.tfar = kDirectional ? kInf : 0x1.fffffep-1f;  // exclusive of the point itself
   for (size_t begin = 0; begin < n; begin += kBundle) {
     const size_t count = std::min(kBundle, n - begin);

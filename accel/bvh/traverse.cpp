@@ -62,13 +62,13 @@ void closest(const TraceScene& scene, RayHit* rays, size_t n) {
 void any(const TraceScene& scene, Ray* rays, size_t n) {
   with_config(scene, [&](auto config) { trace_any_singly<decltype(config)>(scene, rays, n); });
 }
-void points(const TraceScene& scene, const Vec3f& light, bool directional, const float* px, const float* py,
-            const float* pz, size_t n, uint8_t* occluded) {
+void points(const TraceScene& scene, const BundleOrigin& origin, const float* px, const float* py, const float* pz,
+            size_t n, uint8_t* occluded) {
   with_config(scene, [&](auto config) {
-    if (directional)
-      trace_points_in_bundles<decltype(config), true>(scene, light, px, py, pz, n, occluded);
+    if (origin.directional)
+      trace_points_in_bundles<decltype(config), true>(scene, origin, px, py, pz, n, occluded);
     else
-      trace_points_in_bundles<decltype(config), false>(scene, light, px, py, pz, n, occluded);
+      trace_points_in_bundles<decltype(config), false>(scene, origin, px, py, pz, n, occluded);
   });
 }
 const char* target() { return hwy::TargetName(HWY_TARGET); }
@@ -97,14 +97,15 @@ void trace_any(const TraceScene& scene, std::span<Ray> rays) {
   if (scene.top->root != kEmptyChild) HWY_DYNAMIC_DISPATCH(any)(scene, rays.data(), rays.size());
 }
 
-void trace_points(const TraceScene& scene, const Vec3f& light, bool directional, const float* px, const float* py,
+void trace_points(const TraceScene& scene, const BundleOrigin& origin, const float* px, const float* py,
                   const float* pz, size_t n, uint8_t* occluded) {
+  const auto& [light, directional, mask] = origin;
   const bool valid = within(light, directional ? scene.limits.direction : scene.limits.origin);
   if (scene.top->root == kEmptyChild || !valid || (directional && light == Vec3f{})) {
     std::fill_n(occluded, n, uint8_t{0});
     return;
   }
-  HWY_DYNAMIC_DISPATCH(points)(scene, light, directional, px, py, pz, n, occluded);
+  HWY_DYNAMIC_DISPATCH(points)(scene, origin, px, py, pz, n, occluded);
 }
 
 const char* traversal_target() { return HWY_DYNAMIC_DISPATCH(target)(); }

@@ -24,7 +24,6 @@ struct TraceScene {
   const HitFilter* filter = nullptr;
   const uint8_t* filtered = nullptr;     // by mesh: FilteredRays
   const uint32_t* mesh_masks = nullptr;  // by mesh
-  uint32_t point_mask = 0xffffffffu;     // of the rays of trace_points
   bool robust = true;
   bool boxes = false;  // leaves hold boxes, not triangles
   bool masks = false;  // some mesh mask is not all ones
@@ -35,7 +34,7 @@ struct TraceScene {
 void trace_closest(const TraceScene& scene, std::span<RayHit> rays);
 void trace_any(const TraceScene& scene, std::span<Ray> rays);
 // See Accel::occluded_from_point.
-void trace_points(const TraceScene& scene, const Vec3f& light, bool directional, const float* px, const float* py,
+void trace_points(const TraceScene& scene, const BundleOrigin& origin, const float* px, const float* py,
                   const float* pz, size_t n, uint8_t* occluded);
 
 // The instruction set in use: "AVX3", "AVX2", "SSE4", or a portable one ("SCALAR", "EMU128").

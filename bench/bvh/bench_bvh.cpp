@@ -197,7 +197,7 @@ void our_closest(const Accel& accel, const std::vector<RayHit>& rays) {
 void our_points(const Accel& accel, const std::vector<PointBundle>& bundles) {
   uint8_t out[kPointsPerLight];
   for (const PointBundle& b : bundles) {
-    accel.occluded_from_point(b.light, false, b.x, b.y, b.z, kPointsPerLight, out);
+    accel.occluded_from_point({b.light, false}, b.x, b.y, b.z, kPointsPerLight, out);
     for (const uint8_t o : out) sink += o;
   }
 }

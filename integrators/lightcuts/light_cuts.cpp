@@ -11,6 +11,7 @@
 #include "clustering/bounds-inl.h"
 #include "clustering/kernel_dispatch-inl.h"
 #include "clustering/light_kernel-inl.h"
+#include "clustering/light_kernel.h"
 #include "clustering/sphere_integral-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -86,9 +87,7 @@ HWY_INLINE void TraceEstimates(const Accel& accel, const Vpl& light, const Rgb& 
     }
   }
   if (n == 0) return;
-  const bool directional = light.kind == VplKind::directional;
-  accel.occluded_from_point(directional ? -light.normal : light.position, directional, cuts.x, cuts.y, cuts.z, n,
-                            cuts.occluded);
+  accel.occluded_from_point(shadow_origin(light), cuts.x, cuts.y, cuts.z, n, cuts.occluded);
   const uint8_t* occluded = cuts.occluded;
   for (size_t g = 0; g < kCutGroups; ++g) {
     if (lit[g] == 0) continue;

@@ -124,9 +124,8 @@ bool behind(const Blocks::Block& b, const WspdNode& n) {
 // A cluster in a block's clustering.
 struct Cluster {
   uint32_t node = 0;
-  bool directional = false;
   bool strong = false;             // its shadows matter enough to be looked at in parts of the block
-  Vec3f origin{};                  // of its shadow rays; directional: where light comes from
+  BundleOrigin origin;             // of its shadow rays
   float share = 1.0f;              // R of Eq. 2.21
   uint32_t lit = 0, seen = 0;      // samples that get light from it; and are not in its shadow
   float luminance[kSamples] = {};  // what they would get if nothing stood between
@@ -292,18 +291,16 @@ class Wspd final : public Integrator {
     const std::span<const Vpl> lights = tree_.groups(n);
     Cluster c;
     c.node = node;
-    c.directional = lights[0].kind == VplKind::directional;
+    c.origin = shadow_origin(lights[0]);
     const Vec3f to_block = block.box.center() - n.center;
-    if (c.directional) {
-      c.origin = -lights[0].normal;
-    } else if (n.leaf()) {
-      c.origin = lights[0].position;
-    } else if (cubemaps_) {  // V to the ball's boundary, R inside
-      const float distance = length(to_block);
-      c.origin = distance > n.radius ? n.center + to_block * (n.radius / distance) : block.box.center();
-      c.share = tree_.local_visibility(n, to_block);
-    } else {
-      c.origin = representative(n, block.box.center());
+    if (!c.origin.directional && !n.leaf()) {
+      if (cubemaps_) {  // V to the ball's boundary, R inside
+        const float distance = length(to_block);
+        c.origin.light = distance > n.radius ? n.center + to_block * (n.radius / distance) : block.box.center();
+        c.share = tree_.local_visibility(n, to_block);
+      } else {
+        c.origin = shadow_origin(representative(n, block.box.center()));
+      }
     }
     light_block(lights, 1.0f, falloff_, blocks.samples, b * kSamples, kSamples, false, work.part);
     uint32_t lit[kSamples];
@@ -315,7 +312,7 @@ class Wspd final : public Integrator {
       lit[c.lit++] = s;
     }
     if (c.lit > 0) {
-      scene_->accel().occluded_from_point(c.origin, c.directional, work.x, work.y, work.z, c.lit, work.occluded);
+      scene_->accel().occluded_from_point(c.origin, work.x, work.y, work.z, c.lit, work.occluded);
       for (uint32_t i = 0; i < c.lit; ++i) {
         ++work.rays[lit[i] * block.count / kSamples];
         if (work.occluded[i] != 0) continue;
@@ -327,7 +324,7 @@ class Wspd final : public Integrator {
   }
 
   // A light of the cluster that shines at the block, the strongest of a few.
-  Vec3f representative(const WspdNode& n, const Vec3f& point) const {
+  const Vpl& representative(const WspdNode& n, const Vec3f& point) const {
     const uint32_t count = n.last - n.first, step = std::max(1u, count / 8);
     uint32_t best = n.first;
     float most = -1.0f;
@@ -338,7 +335,7 @@ class Wspd final : public Integrator {
       const float strength = c * luminance(v.intensity);
       if (strength > most) most = strength, best = i;
     }
-    return tree_.lights()[best].position;
+    return tree_.lights()[best];
   }
 
   // Splits clusters that give any sample more than its share of the radiance. [thesis sec. 2.3, "high intensity
@@ -357,7 +354,7 @@ class Wspd final : public Integrator {
     for (size_t c = 0; c < work.clusters.size(); ++c) {
       if (c % 64 == 0 && progress.cancelled()) return;
       const WspdNode& n = tree_.node(work.clusters[c].node);
-      const bool directional = work.clusters[c].directional;
+      const bool directional = work.clusters[c].origin.directional;
       bool bright = bright_ == 0.0f;
       for (size_t s = 0; s < kSamples; ++s) bright = bright || work.clusters[c].luminance[s] > limit[s];
       if (n.leaf() || !bright) {
@@ -390,7 +387,7 @@ class Wspd final : public Integrator {
         work.z[k] = points.position[2][first + i];
         ++work.rays[offset + i];
       }
-      scene_->accel().occluded_from_point(c.origin, c.directional, work.x, work.y, work.z, n, work.occluded);
+      scene_->accel().occluded_from_point(c.origin, work.x, work.y, work.z, n, work.occluded);
     };
     bool known = false;
     if (sampling_ && lit > kSamples) {

@@ -2,7 +2,6 @@
 #include "core/parallel.h"
 #include "integrators/wspd/wspd_tree.h"
 #include "lights/falloff.h"
-#include "scene/ray_kind.h"
 
 namespace lumicut {
 
@@ -10,9 +9,10 @@ namespace {
 
 // How unlike two lights shine: the distance of their normals; more than any such where they are of different make.
 float unlike2(const Vpl& a, const Vpl& b) {
-  if (a.kind == VplKind::sphere && b.kind == VplKind::sphere) return length2(a.normal - b.normal);
+  if (a.kind == VplKind::sphere && b.kind == VplKind::sphere && a.ray_mask == b.ray_mask)
+    return length2(a.normal - b.normal);
   if (a.kind != b.kind || a.edge_or_radius != b.edge_or_radius || a.blend_cosine != b.blend_cosine ||
-      a.spot_cosine != b.spot_cosine || a.spread_tan != b.spread_tan)
+      a.spot_cosine != b.spot_cosine || a.spread_tan != b.spread_tan || a.ray_mask != b.ray_mask)
     return 9.0f;
   return length2(a.normal - b.normal);
 }
@@ -185,7 +185,7 @@ void WspdTree::find_cubemaps(const Options& options, Progress& progress) {
           const float t = -b + std::sqrt(std::max(0.0f, b * b - length2(from) + node.radius * node.radius));
           if (!(t > 0.0f)) continue;
           Ray r;
-          r.org = v.position, r.dir = d, r.tfar = t, r.mask = kShadowRay;
+          r.org = v.position, r.dir = d, r.tfar = t, r.mask = v.ray_mask;
           rays.push_back(r);
           samples.push_back({cell, weight});
         }

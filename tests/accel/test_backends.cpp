@@ -158,10 +158,10 @@ TEST_P(Backends, RaysWithNaNOrInfinityHitNothing) {
   EXPECT_EQ(first(*accel, ray_of({0.5f, 0.5f, 0.5f}, {0, 0, 0})).hit.geom, kNoId);
   const float px[2] = {kNaN, 0.5f}, py[2] = {0.5f, 0.5f}, pz[2] = {0.5f, 0.5f};
   uint8_t out[2] = {7, 7};
-  accel->occluded_from_point({0.5f, 0.5f, 0.5f}, false, px, py, pz, 2, out);
+  accel->occluded_from_point({{0.5f, 0.5f, 0.5f}, false}, px, py, pz, 2, out);
   EXPECT_EQ(out[0], 0);
   EXPECT_EQ(out[1], 0);  // a point at the light
-  accel->occluded_from_point({kNaN, 0, 0}, true, px, py, pz, 2, out);
+  accel->occluded_from_point({{kNaN, 0, 0}, true}, px, py, pz, 2, out);
   EXPECT_EQ(out[0], 0);
   EXPECT_EQ(out[1], 0);
 }
@@ -191,13 +191,13 @@ TEST_P(Backends, RaysOutOfRangeHitNothing) {
         // The same place as a light, as a point, and as a sun's direction.
         const float x[2] = {r.ray.org.x, 0.5f}, y[2] = {r.ray.org.y, 0.5f}, z[2] = {r.ray.org.z, 0.5f};
         uint8_t out[2] = {7, 7};
-        accel->occluded_from_point(r.ray.org, false, x + 1, y + 1, z + 1, 1, out);
+        accel->occluded_from_point({r.ray.org, false}, x + 1, y + 1, z + 1, 1, out);
         EXPECT_EQ(out[0], 0);
-        accel->occluded_from_point({0.5f, 0.5f, -5}, false, x, y, z, 2, out);
+        accel->occluded_from_point({{0.5f, 0.5f, -5}, false}, x, y, z, 2, out);
         EXPECT_EQ(out[0], 0);
-        accel->occluded_from_point({0, 0, -1}, true, x, y, z, 2, out);
+        accel->occluded_from_point({{0, 0, -1}, true}, x, y, z, 2, out);
         EXPECT_EQ(out[0], 0);
-        accel->occluded_from_point(r.ray.org, true, x + 1, y + 1, z + 1, 1, out);
+        accel->occluded_from_point({r.ray.org, true}, x + 1, y + 1, z + 1, 1, out);
         EXPECT_EQ(out[0], 0);
       }
   }
@@ -213,7 +213,7 @@ TEST_P(Backends, EmptyGeometryIsNeverHit) {
     EXPECT_TRUE(accel->info().bounds.empty());
     accel->intersect({});
     accel->occluded({});
-    accel->occluded_from_point({}, false, nullptr, nullptr, nullptr, 0, nullptr);
+    accel->occluded_from_point({}, nullptr, nullptr, nullptr, 0, nullptr);
   }
 }
 
@@ -249,7 +249,7 @@ TEST_P(Backends, CutOutLetsTheRayThrough) {
   EXPECT_TRUE(blocked(*accel, ray_of({0.7f, 0.2f, 0}, {0, 0, 1}, 0, 1.5f)));
   const float px[2] = {0.2f, 0.7f}, py[2] = {0.2f, 0.2f}, pz[2] = {1.5f, 1.5f};
   uint8_t out[2] = {7, 7};
-  accel->occluded_from_point({0.45f, 0.2f, -1e5f}, false, px, py, pz, 2, out);
+  accel->occluded_from_point({{0.45f, 0.2f, -1e5f}, false}, px, py, pz, 2, out);
   EXPECT_EQ(out[0], 0);
   EXPECT_EQ(out[1], 1);
 }
@@ -347,7 +347,7 @@ void expect_bundles_agree_with_single_rays(const Accel& accel, uint64_t seed, ui
         px[i] = p.x, py[i] = p.y, pz[i] = p.z;
       }
       fill_stack(n % 2 == 0 ? 0xff : 0x00);
-      accel.occluded_from_point(light, directional, px.data(), py.data(), pz.data(), n, out.data());
+      accel.occluded_from_point({light, directional, mask}, px.data(), py.data(), pz.data(), n, out.data());
       size_t differ = 0;
       for (size_t i = 0; i < n; ++i) {
         const Vec3f p{px[i], py[i], pz[i]};
@@ -384,7 +384,6 @@ TEST_P(Backends, ManyPointsToOneLightSeeMeshesByTheirMask) {
   for (const uint32_t mask : {1u, 2u, 4u, 8u}) {
     AccelGeometry geometry{{a.view(), b.view(), c.view()}, {}, nullptr};
     geometry.meshes[0].mask = 1, geometry.meshes[1].mask = 2, geometry.meshes[2].mask = 2 | 4;
-    geometry.point_mask = mask;
     for (const bool robust : {true, false}) expect_bundles_agree_with_single_rays(*make(geometry, robust), 8, mask);
   }
 }

@@ -119,7 +119,7 @@ TEST(AgglomerativeBvh, RobustMissesNothingOnAClosedMesh) {
         const Vec3f p = from + (mesh.positions[e[0]] - from) * 1.5f;
         x[k] = p.x, y[k] = p.y, z[k] = p.z;
       }
-      accel->occluded_from_point(from, false, x, y, z, 16, out);
+      accel->occluded_from_point({from, false}, x, y, z, 16, out);
       for (const uint8_t blocked : out) bundles_missed += blocked == 0;
     }
   }
@@ -153,7 +153,7 @@ TEST(AgglomerativeBvh, BundlesAnswerAsSingleRaysDo) {
           const Vec3f p = (i % 5 == 0 && !sun ? light : centre) + test::random_direction(rng) * spread;
           x[k] = p.x, y[k] = p.y, z[k] = p.z;
         }
-        accel->occluded_from_point(light, sun, x, y, z, 70, out);
+        accel->occluded_from_point({light, sun}, x, y, z, 70, out);
         for (int k = 0; k < 70; ++k) {
           const Vec3f p{x[k], y[k], z[k]};
           Ray r = (sun ? ray_of(p, light) : ray_of(light, p - light, 0, 0x1.fffffep-1f)).ray;
@@ -274,7 +274,7 @@ TEST(AgglomerativeBvh, BoxHitsEqualALoopOverAllBoxes) {
   EXPECT_LE(different, 5u);
   float x[3] = {0.9f, 0.1f, 5}, y[3] = {0.5f, 0.5f, 5}, z[3] = {0.5f, 0.5f, 6};
   uint8_t out[3];
-  bvh->occluded_from_point({5, 5, 5}, false, x, y, z, 3, out);
+  bvh->occluded_from_point({{5, 5, 5}, false}, x, y, z, 3, out);
   EXPECT_EQ(out[2], 0);
 }
 

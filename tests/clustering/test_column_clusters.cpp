@@ -82,10 +82,10 @@ TEST(LightMatrix, EntriesAreWhatTheLightGivesToTheRow) {
       const bool directional = s.lights[l].kind == VplKind::directional;
       const Vec3f& at = s.lights[l].position;
       if (directional)
-        s.scene->accel().occluded_from_point(-s.lights[l].normal, true, &p.position.x, &p.position.y, &p.position.z, 1,
-                                             &occluded);
+        s.scene->accel().occluded_from_point({-s.lights[l].normal, true}, &p.position.x, &p.position.y, &p.position.z,
+                                             1, &occluded);
       else
-        s.scene->accel().occluded_from_point(p.position, false, &at.x, &at.y, &at.z, 1, &occluded);
+        s.scene->accel().occluded_from_point({p.position, false}, &at.x, &at.y, &at.z, 1, &occluded);
       EXPECT_EQ(entry == 0.0f, occluded != 0) << l << " " << r;
       shadowed += occluded;
     }

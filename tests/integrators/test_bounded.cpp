@@ -53,10 +53,10 @@ class WatchedAccel final : public Accel {
     watch_.count(rays.size());
     inner_->occluded(rays);
   }
-  void occluded_from_point(const Vec3f& light, bool directional, const float* px, const float* py, const float* pz,
-                           size_t n, uint8_t* out) const override {
+  void occluded_from_point(const BundleOrigin& origin, const float* px, const float* py, const float* pz, size_t n,
+                           uint8_t* out) const override {
     watch_.count(n);
-    inner_->occluded_from_point(light, directional, px, py, pz, n, out);
+    inner_->occluded_from_point(origin, px, py, pz, n, out);
   }
 
  private:

@@ -83,7 +83,7 @@ TEST(Identity, EveryFieldOfAMaterialCounts) { EXPECT_EQ(expect_every_field_count
 TEST(Identity, EveryFieldOfALightCounts) { EXPECT_EQ(expect_every_field_counts(Light{}), 26u); }
 TEST(Identity, EveryFieldOfAnEnvironmentCounts) { EXPECT_EQ(expect_every_field_counts(Environment{}), 15u); }
 TEST(Identity, EveryFieldOfACameraCounts) { EXPECT_EQ(expect_every_field_counts(Camera{}), 22u); }
-TEST(Identity, EveryFieldOfAVirtualLightCounts) { EXPECT_EQ(expect_every_field_counts(Vpl{}), 19u); }
+TEST(Identity, EveryFieldOfAVirtualLightCounts) { EXPECT_EQ(expect_every_field_counts(Vpl{}), 20u); }
 TEST(Identity, EveryFieldOfAFrameCounts) {
   EXPECT_EQ(expect_every_field_counts(FrameOptions{}), 11u);
   FrameOptions frame;
@@ -119,7 +119,7 @@ TEST(Identity, LightProfilesCountByTheirContent) {
   EXPECT_NE(hash(0.5f), hash_value(0, LightProfiles{}));
 }
 TEST(Identity, EveryFieldOfASetOfVirtualLightsCounts) {
-  EXPECT_EQ(expect_every_field_counts(VplSet{{Vpl{}, Vpl{}}, 3, 1, 1, {}}), 24u);
+  EXPECT_EQ(expect_every_field_counts(VplSet{{Vpl{}, Vpl{}}, 3, 1, 1, {}}), 25u);
 }
 TEST(Identity, EveryFieldOfAScenesConfigurationCounts) { EXPECT_GE(expect_every_field_counts(Scene::Config{}), 3u); }
 

@@ -134,13 +134,13 @@ TEST_P(RayKinds, AMirrorShowsWhatGlossyRaysSee) {
   EXPECT_LT(unseen[middle].y, 1.5f * unseen[middle].x) << "the wall behind it";
 }
 
-// Nothing is counted twice or lost: the mean of compensated iterations is the path tracer's, whatever rays see a mesh. (Where
-// shadow and diffuse rays differ, virtual lights are stopped by what shadow rays see, paths by what diffuse rays do.)
+// Nothing is counted twice or lost: the mean of compensated iterations is the path tracer's, whatever rays see a mesh.
 TEST(RayKind, CompensatedIterationsGiveThePathTracersImage) {
   const auto lamp = [](uint32_t mask) { return [=](Scene& scene) { box(mask, 1)(scene); }; };
   for (const auto& [name, add] :
        {std::pair{"camera", std::function<void(Scene&)>(box(kCameraRay))},
-        std::pair{"no camera", box(kAllRays & ~kCameraRay)},
+        std::pair{"no camera", box(kAllRays & ~kCameraRay)}, std::pair{"no shadow", box(kAllRays & ~kShadowRay)},
+        std::pair{"no diffuse", box(kAllRays & ~kDiffuseRay)},
         std::pair{"a lamp without glossy rays", std::function<void(Scene&)>(lamp(kAllRays & ~kGlossyRay))},
         std::pair{"a lamp for camera and glossy rays", std::function<void(Scene&)>(lamp(kCameraRay | kGlossyRay))}}) {
     const auto scene = room(add);
@@ -151,6 +151,26 @@ TEST(RayKind, CompensatedIterationsGiveThePathTracersImage) {
     const auto [mean, deviation] =
         test::mean_of_iterations(*scene, test::trimmed(40), {.width = kWidth, .height = kHeight, .samples = 4});
     EXPECT_NEAR(mean / truth, 1.0, test::kSanitized ? 0.08 : 0.01 + 3 * deviation / truth) << name;
+  }
+}
+
+// Bounced light is stopped by what scattered rays see, a lamp's by what shadow rays do: in every method, for trees and
+// columns keep the two apart.
+TEST(RayKind, EveryMethodStopsBouncedLightByWhatScatteredRaysSee) {
+  for (const auto& [name, mask] :
+       {std::pair{"no shadow", kAllRays & ~kShadowRay}, std::pair{"no diffuse", kAllRays & ~kDiffuseRay}}) {
+    const auto scene = room(box(mask));
+    const double exact = test::mean_luminance(render(*scene));
+    // What one mask for all lights would give differs: the test can fail.
+    VplSet lights = test::lights_of(*scene, 400);
+    lights.light_paths = 0;  // nothing is known of them
+    const double mistaken = test::mean_luminance(
+        test::render(*scene, "exhaustive", lights, {}, {.width = kWidth, .height = kHeight}).radiance);
+    EXPECT_GT(std::abs(mistaken / exact - 1), 0.02) << name;
+    for (const IntegratorEntry& entry : integrators()) {
+      if (std::string(entry.id) == "path_tracer") continue;
+      EXPECT_NEAR(test::mean_luminance(render(*scene, entry.id)) / exact, 1, 0.01) << name << ": " << entry.id;
+    }
   }
 }
 

@@ -112,7 +112,7 @@ std::vector<uint8_t> stopped_in_bundles(const Scene& scene, const std::vector<Ra
       const Vec3f p = (directional ? r.org : r.org + r.dir * r.tfar) + shift;
       x[i] = p.x, y[i] = p.y, z[i] = p.z;
     }
-    scene.accel().occluded_from_point(directional ? normalize(r.dir) : r.org, directional, x, y, z, kCount, occluded);
+    scene.accel().occluded_from_point({directional ? normalize(r.dir) : r.org, directional}, x, y, z, kCount, occluded);
     out.push_back(occluded[0]);
   }
   return out;
@@ -217,9 +217,9 @@ TEST(ShadowsPass, ButForSurfacesBehindTheGlass) {
     float x[64], y[64], z[64];
     uint8_t occluded[64];
     for (int i = 0; i < 64; ++i) x[i] = (i % 2 != 0 ? 0.5f : -0.5f), y[i] = 0.01f * static_cast<float>(i), z[i] = -2;
-    scene.accel().occluded_from_point({0, 0, 1e6f}, false, x, y, z, 64, occluded);
+    scene.accel().occluded_from_point({{0, 0, 1e6f}, false}, x, y, z, 64, occluded);
     for (int i = 0; i < 64; ++i) EXPECT_EQ(occluded[i], i % 2 != 0 ? 0 : 1) << backend;
-    scene.accel().occluded_from_point({0, 0, 1}, true, x, y, z, 64, occluded);
+    scene.accel().occluded_from_point({{0, 0, 1}, true}, x, y, z, 64, occluded);
     for (int i = 0; i < 64; ++i) EXPECT_EQ(occluded[i], i % 2 != 0 ? 0 : 1) << backend;
   }
 }
