@@ -125,7 +125,8 @@ class Accel {
 };
 
 inline constexpr const char* kDefaultAccel = "bvh";
-// "bvh" or "embree" for the name of a backend; "agglomerative" is an earlier name of "bvh". Throws Error on others.
+// "bvh" or "embree" for the name of a backend; "agglomerative" is an earlier name of "bvh". Throws Error on others,
+// Error(unsupported) on "embree" where it is not built in.
 std::string accel_kind_of(const std::string& name);
 
 // Builds the backend of that name, on the caller's arena. Throws Error on an unknown name, an index out of range, or a

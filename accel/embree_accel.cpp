@@ -330,6 +330,8 @@ class EmbreeAccel final : public Accel {
 
 }  // namespace
 
+bool has_embree() { return true; }
+
 std::unique_ptr<Accel> make_embree_accel(const AccelGeometry& geometry, const AccelOptions& options,
                                          Progress* progress) {
   return std::make_unique<EmbreeAccel>(geometry, options, progress);

@@ -99,7 +99,11 @@ Inverses invert_instances(const AccelGeometry& geometry) {
 
 std::string accel_kind_of(const std::string& name) {
   if (name == "bvh" || name == "agglomerative") return "bvh";
-  if (name == "embree") return name;
+  if (name == "embree") {
+    if (!has_embree())
+      throw Error(ErrorCode::unsupported, "accel 'embree' is not in this library, which was built without it");
+    return name;
+  }
   fail_argument("accel '" + name + "' is neither 'bvh' nor 'embree'");
 }
 

@@ -34,6 +34,9 @@ if(LUMICUT_SANITIZE)
 endif()
 target_compile_definitions(lumicut_options INTERFACE "HWY_DISABLED_TARGETS=${disabled_targets}")
 target_include_directories(lumicut_options INTERFACE ${PROJECT_SOURCE_DIR})
+if(NOT LUMICUT_EMBREE)
+  target_compile_definitions(lumicut_options INTERFACE LUMICUT_WITHOUT_EMBREE)  # tests/support/backends.h
+endif()
 if(LUMICUT_SANITIZE)
   # A finding of UndefinedBehaviorSanitizer ends the program: a test that goes on would pass. Its checks of null pointers
   # and of dynamic types double the compiler's time and find what ends in a crash anyway.

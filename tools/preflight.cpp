@@ -91,7 +91,7 @@ class World {
     if (indices.empty()) return;
     lumicut_accel_desc desc{};
     desc.struct_size = sizeof(desc);
-    desc.kind = "embree", desc.robust = 1;
+    desc.robust = 1;
     desc.positions = positions.data(), desc.position_count = positions.size() / 3;
     desc.indices = indices.data(), desc.triangle_count = indices.size() / 3;
     io::check(api, api.accel_build(device, &desc, accel_.out()), "preflight");

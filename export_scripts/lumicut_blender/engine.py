@@ -122,6 +122,9 @@ class LumicutEngine(bpy.types.RenderEngine):
                 report.note(scene.world.name, "Worlds that the camera sees otherwise, black in scene files' images")
             if len(views) > 1:
                 report.note(views[0][0], "Of several views the first alone is exported")
+        tracing = properties.tracing_of(settings)
+        if tracing["accel"] != settings.accel:
+            report.note(settings.accel, "Not in this library, whose own tree traces rays")
         self._tell(report)
         if export_requests and not self.is_preview:
             export.write_scene(export_requests[0], data, width, height, settings)
@@ -135,7 +138,7 @@ class LumicutEngine(bpy.types.RenderEngine):
 
         device = runtime.device(settings.threads)
         watched = Watched(self)
-        with library.Scene(device, **properties.tracing_of(settings)) as target, library.Integrator(device, integrator_name) as integrator:
+        with library.Scene(device, **tracing) as target, library.Integrator(device, integrator_name) as integrator:
             data.upload(target, self._check)
             triangles, instances = data.triangles(), sum(len(m.transforms) for m in data.meshes)
             self._backdrop = None

@@ -163,6 +163,8 @@ class LUMICUT_PT_performance(Panel, bpy.types.Panel):
         layout.use_property_decorate = False
         settings = context.scene.lumicut
         layout.prop(settings, "accel")
+        if runtime.loaded() and properties.tracing_of(settings)["accel"] != settings.accel:
+            layout.label(text="Not in this library: BVH is used", icon="INFO")
         if settings.accel == "bvh":
             layout.prop(settings, "builder")
         layout.prop(settings, "robust")

@@ -8,7 +8,7 @@ from . import library, runtime
 COMMON = "common"  # the group of parameters that nearly all integrators share
 ACCELS = [
     ("bvh", "BVH", "The library's own tree: shares nothing with the host"),
-    ("embree", "Embree", "Intel's tree. On Blender from blender.org, which carries an Embree of its own, the two may clash"),
+    ("embree", "Embree", "Intel's tree, where the library has it; the add-on's zip has not. On Blender from blender.org, which carries an Embree of its own, the two may clash"),
 ]
 BUILDERS = [  # of lumicut_scene_desc
     ("DEFAULT", "Default", "Binned splits down to 4096 triangles, agglomeration below, then reinsertion: 5 % in 3 passes"),
@@ -60,9 +60,10 @@ def property_of(parameter):
 
 
 def tracing_of(settings):
-    """What traces rays, as library.Scene takes it."""
-    own = settings.accel == "bvh" and settings.builder != "DEFAULT"
-    return {"accel": settings.accel, "builder": settings.builder if own else None, "robust": settings.robust}
+    """What traces rays, as library.Scene takes it: the library's own tree where it has no other."""
+    accel = settings.accel if runtime.has_accel(settings.accel) else "bvh"
+    own = accel == "bvh" and settings.builder != "DEFAULT"
+    return {"accel": accel, "builder": settings.builder if own else None, "robust": settings.robust}
 
 
 def text_of(value):

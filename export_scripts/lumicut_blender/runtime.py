@@ -4,7 +4,7 @@ import bpy
 
 from . import library
 
-_state = {"library": None, "failure": "", "device": None, "threads": None}
+_state = {"library": None, "failure": "", "device": None, "threads": None, "accels": {}}
 last = {"stats": {}, "notes": [], "collect_seconds": 0.0, "seconds": 0.0, "integrator": "", "scene": {}}
 
 
@@ -55,6 +55,20 @@ def device(threads=0):
     return _state["device"]
 
 
+def has_accel(name):
+    """Whether the library has what traces rays by that name: Embree is left out of some."""
+    if name == "bvh" or _state["library"] is None:
+        return True
+    if name not in _state["accels"]:
+        try:
+            library.Scene(library.Device(_state["library"], 1), name).close()
+            _state["accels"][name] = True
+        except library.Error:
+            _state["accels"][name] = False
+    return _state["accels"][name]
+
+
 def release():
     _state["device"] = None
+    _state["accels"] = {}
     _state["library"] = None

@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "tests/accel/meshes.h"
+#include "tests/support/backends.h"
 
 namespace lumicut {
 namespace {
@@ -433,7 +434,11 @@ TEST_P(Backends, TrianglesWithHugeCoordinatesAreLeftOutAndTheRestIsSeen) {
   EXPECT_EQ(first(*accel, ray_of({-5, 0.2f, 0}, {0, 0, 1})).hit.geom, kNoId);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, Backends, testing::Values("embree", "bvh", "host"),
+INSTANTIATE_TEST_SUITE_P(All, Backends, testing::ValuesIn([] {
+                           auto all = test::backends();
+                           all.push_back("host");
+                           return std::vector<std::string>(all.begin(), all.end());
+                         }()),
                          [](const auto& backend) { return backend.param; });
 
 TEST(MakeAccel, UnknownNameIsNamed) {
@@ -445,9 +450,20 @@ TEST(MakeAccel, UnknownNameIsNamed) {
   }
 }
 
+TEST(MakeAccel, EmbreeIsRefusedByNameWhereItIsNotBuiltIn) {
+  if (test::kHasEmbree) GTEST_SKIP() << "this build has Embree";
+  try {
+    make_accel("embree", {}, {});
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::unsupported);
+    EXPECT_NE(std::string(e.what()).find("'embree' is not in this library"), std::string::npos);
+  }
+}
+
 TEST(MakeAccel, CancelStopsTheBuild) {
   const Mesh mesh = test::random_soup(200000, 0.01f, 9);
-  for (const char* name : {"embree", "bvh"}) {
+  for (const char* name : test::backends()) {
     Progress progress;
     progress.cancel();
     EXPECT_THROW(make_accel(name, {{mesh.view()}, {}, nullptr}, {}, &progress), Error);
@@ -467,6 +483,7 @@ TEST(MakeAccel, CancelStopsTheBuild) {
 }
 
 TEST(EmbreeBackend, BuildStaysInTheCallersArena) {
+  SKIP_WITHOUT_EMBREE();
   const Mesh mesh = test::random_soup(100000, 0.01f, 9);
   std::atomic<int> inside{0}, most{0};
   struct Watch : tbb::task_scheduler_observer {

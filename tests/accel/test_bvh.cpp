@@ -12,6 +12,7 @@
 #include "core/parallel.h"
 #include "tests/accel/meshes.h"
 #include "tests/accel/trees.h"
+#include "tests/support/backends.h"
 #include "tests/support/trimmed.h"
 
 namespace lumicut {
@@ -32,6 +33,7 @@ Mesh with_troubles(Mesh mesh) {
 }
 
 TEST(AgglomerativeBvh, HitsEqualEmbreeOnAMillionRaysAScene) {
+  SKIP_WITHOUT_EMBREE();
   const Mesh scenes[] = {with_troubles(test::random_soup(20000, 0.04f, 1)), with_troubles(test::sphere(60, 90))};
   for (const Mesh& mesh : scenes)
     for (const bool robust : {true, false}) {
@@ -291,6 +293,7 @@ TEST(AgglomerativeBvh, BadBoxesAreNamed) {
 }
 
 TEST(AgglomerativeBvh, ManyInstancesAgreeWithEmbree) {
+  SKIP_WITHOUT_EMBREE();
   const Mesh a = test::random_soup(300, 0.2f, 8), b = test::sphere(10, 14);
   AccelGeometry geometry{{a.view(), b.view()}, {}, nullptr};
   geometry.meshes[1].mask = 2;

@@ -4,6 +4,7 @@ import os
 import pathlib
 import re
 import unittest
+import unittest.mock
 
 import addon_utils
 import bpy
@@ -142,8 +143,19 @@ class Tables(unittest.TestCase):
         self.assertFalse(settings.common.compensate)
         self.assertEqual((settings.passes, settings.max_seconds, settings.target_error), (1, 0, 0))
 
+    def test_a_library_without_embree_renders_by_its_own_tree_and_says_so(self):
+        h.add_plane(material=h.diffuse())
+        h.add_light("POINT")
+        bpy.context.scene.lumicut.accel = "embree"
+        with h.quiet(), unittest.mock.patch.object(runtime, "has_accel", lambda name: name == "bvh"):
+            h.set_lumicut(vpls=100)
+            self.assertGreater(h.radiance(h.render()).max(), 0)
+        self.assertTrue(any("embree" in note and "own tree" in note for note in runtime.last["notes"]), runtime.last["notes"])
+
     def test_both_trees_give_the_same_image(self):
         import numpy as np
+        if not runtime.has_accel("embree"):
+            self.skipTest("this library has no Embree")
         h.add_plane(material=h.diffuse())
         h.add_sphere(0.5, (0, 0, 0.5))
         h.add_light("POINT", energy=100, shadow_soft_size=0)

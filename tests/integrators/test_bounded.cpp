@@ -5,6 +5,7 @@
 
 #include <thread>
 
+#include "tests/support/backends.h"
 #include "tests/support/render.h"
 
 namespace lumicut {
@@ -195,6 +196,7 @@ INSTANTIATE_TEST_SUITE_P(Registry, InstancedScenes, testing::ValuesIn(ids()),
                          [](const auto& entry) { return std::string(entry.param); });
 
 TEST_P(InstancedScenes, EndOnEmbreeToo) {
+  SKIP_WITHOUT_EMBREE();
   const auto mean = [&](const Scene& scene, const VplSet& vpls) {
     double sum = 0;
     for (const Rgb& c : test::render(scene, GetParam(), vpls, {}, {.width = 24, .height = 18}).radiance)
@@ -268,7 +270,7 @@ INSTANTIATE_TEST_SUITE_P(Registry, Work, testing::ValuesIn(ids()),
 TEST_P(Work, IsAtMostTwiceThatOfSummingAllLights) {
   if (find_integrator(GetParam())->light_source != LightSource::virtual_lights)
     GTEST_SKIP() << "it has no virtual lights";
-  for (const char* accel : {"bvh", "embree"})
+  for (const char* accel : test::backends())
     for (const bool more_lamps : {false, true}) {
       const auto scene = metal_room(accel, more_lamps);
       const VplSet vpls = test::lights_of(*scene, 2000);

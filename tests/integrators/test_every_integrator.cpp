@@ -3,6 +3,7 @@
 
 #include <cstring>
 
+#include "tests/support/backends.h"
 #include "tests/support/render.h"
 
 namespace lumicut {
@@ -17,6 +18,7 @@ INSTANTIATE_TEST_SUITE_P(Registry, EveryIntegrator, testing::ValuesIn([] {
                          [](const auto& entry) { return std::string(entry.param); });
 
 TEST_P(EveryIntegrator, GivesTheSameImageOnEmbreeAndOnOurBvh) {
+  SKIP_WITHOUT_EMBREE();
   const auto embree = test::make_room(1.0f, "embree"), ours = test::make_room(1.0f, "bvh");
   const VplSet vpls = test::lights_of(*embree, 1500);
   const auto a = test::render(*embree, GetParam(), vpls, {}), b = test::render(*ours, GetParam(), vpls, {});

@@ -12,6 +12,7 @@
 #include "io/image_file.h"
 #include "io/scene_json.h"
 #include "io/scene_upload.h"
+#include "tests/support/backends.h"
 
 namespace lumicut::io {
 namespace {
@@ -89,6 +90,7 @@ class ReferenceImages : public testing::TestWithParam<std::string> {
 };
 
 TEST_P(ReferenceImages, ExhaustiveIsUnchanged) {
+  SKIP_WITHOUT_EMBREE();
   const Metrics m = measure("exhaustive", {});
   // Another instruction set rounds otherwise, and an edge pixel or a light path may fall to the other side.
   EXPECT_LT(m.mean_relative_error, 2e-3);
@@ -105,6 +107,7 @@ TEST_P(ReferenceImages, TheDefaultAccelDiffersInPixelsOnEdgesAlone) {
 }
 
 TEST_P(ReferenceImages, LightcutsKeepsItsErrorParameter) {
+  SKIP_WITHOUT_EMBREE();
   for (const auto& [error, limit] : {std::pair{"0.02", 0.02}, {"0.005", 0.005}}) {
     const Metrics m = measure("lightcuts", {{"error", error}});
     EXPECT_LT(m.mean_relative_error, limit + 2e-3) << error;  // and what ExhaustiveIsUnchanged allows

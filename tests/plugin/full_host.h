@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tests/plugin/box_scene.h"
+#include "tests/support/backends.h"
 
 namespace box {
 
@@ -15,7 +16,7 @@ struct Profile {
 };
 
 struct Host {
-  const char* accel = "embree";
+  const char* accel = lumicut::test::last_backend();
   bool robust = true, host_lights = false;
   std::vector<lumicut_texture> textures{4, make<lumicut_texture>()};
   std::vector<std::vector<float>> texels;

@@ -7,6 +7,7 @@
 
 #include "box_scene.h"
 #include "plugin/descriptors.h"
+#include "tests/support/backends.h"
 
 namespace {
 
@@ -142,7 +143,7 @@ TEST(Abi, DescriptorsOfAnySizeAreReadByTheGrowthRule) {
   {
     using T = lumicut_accel_desc;
     auto d = make<T>();
-    d.robust = 1, d.kind = "embree";
+    d.robust = 1, d.kind = lumicut::test::last_backend();
     d.positions = g.positions.data(), d.position_count = g.positions.size() / 3, d.position_stride = 12;
     d.indices = g.indices.data(), d.triangle_count = g.indices.size() / 3;
     check_input("lumicut_accel_desc", bytes_of(d), fields_of<T>(), [&](const void* p) {
@@ -257,7 +258,7 @@ TEST(Abi, DescriptorsThatTheLibraryFillsAreFilledAsFarAsTheyReach) {
   }
   const Geometry g = geometry();
   auto d = make<lumicut_accel_desc>();
-  d.kind = "embree", d.positions = g.positions.data(), d.position_count = g.positions.size() / 3;
+  d.kind = lumicut::test::last_backend(), d.positions = g.positions.data(), d.position_count = g.positions.size() / 3;
   d.indices = g.indices.data(), d.triangle_count = g.indices.size() / 3;
   const api::Accel accel(device, d);
 

@@ -103,7 +103,6 @@ TEST(Errors, PlacesForResultsMustNotBeNull) {
   auto device_desc = make<lumicut_device_desc>();
   device_desc.abi_major = LUMICUT_ABI_MAJOR;
   auto accel_desc = make<lumicut_accel_desc>();
-  accel_desc.kind = "embree";
   auto desc = frame();
   uint64_t count = 0;
   EXPECT_CODE(lumicut_device_create(&device_desc, nullptr), LUMICUT_INVALID_ARGUMENT, "device is NULL");

@@ -12,6 +12,7 @@
 
 #include "box_scene.h"
 #include "lumicut/lumicut_state.h"
+#include "tests/support/backends.h"
 
 using namespace box;
 
@@ -53,7 +54,7 @@ void add_measured_lamp(const api::Scene& s, int of_its_own) {
 void lead_life(int n) {
   const std::vector<std::string> ids = integrator_ids();
   const api::Device device(2);
-  const api::Scene s(device, n % 2 == 0 ? "embree" : "agglomerative");
+  const api::Scene s(device, n % 2 == 0 ? lumicut::test::last_backend() : "agglomerative");
   lumicut_scene_set_materials(s.get(), materials().data(), 4);
   const Geometry g = geometry();
   const lumicut_mesh mesh = g.mesh();

@@ -21,6 +21,7 @@
 #include "lumicut/lumicut.h"
 #include "lumicut/lumicut_lights.h"
 #include "lumicut/lumicut_state.h"
+#include "tests/support/backends.h"
 
 namespace {
 
@@ -320,7 +321,7 @@ std::vector<Case> all_cases() {
   std::vector<Case> all;
   auto info = make<lumicut_integrator_info>();
   for (uint32_t i = 0; lumicut_get_integrator_info(i, &info) == LUMICUT_OK; ++i)
-    for (const char* const accel : {"agglomerative", "embree"}) all.push_back({info.id, accel});
+    for (const char* const accel : lumicut::test::backends()) all.push_back({info.id, accel});
   return all;
 }
 
@@ -354,6 +355,7 @@ TEST(MemoryFault, InAccelsAlone) {
 
 // Embree's builds go other ways after the first that fails.
 TEST(MemoryFault, InEmbreeAlone) {
+  SKIP_WITHOUT_EMBREE();
   for (const bool apart : {false, true}) {
     lumicut_device device = nullptr;
     sweep(

@@ -7,6 +7,7 @@
 #include "full_host.h"
 #include "hwy/highway.h"
 #include "lumicut/lumicut_state.h"
+#include "tests/support/backends.h"
 
 namespace {
 
@@ -29,7 +30,8 @@ std::vector<Change> scene_changes() {
   using M = lumicut_material;
   using L = lumicut_light;
   return {
-      {"scene.accel", [](Host& h) { h.accel = "agglomerative"; }},
+      // Where there is one accel alone, as the next.
+      {"scene.accel", [](Host& h) { h.accel = "agglomerative", h.robust = lumicut::test::kHasEmbree; }},
       {"scene.robust", [](Host& h) { h.robust = false; }},
       {"texture.pixels", [](Host& h) { h.texels[0][7] += 0.125f; }},
       {"texture.pixels of the environment", [](Host& h) { h.texels[3][7] += 0.125f; }},
@@ -358,7 +360,7 @@ class BestInstructions {
 // What docs/progressive.md promises of all but Embree, whose own choice this leaves as it is. Textures, gloss, coats and two passes with samples of their own are in it.
 TEST(InstructionSets, WithFusedMultiplyAddOrWithoutGiveOneImageEach) {
   const api::Device device(2);
-  for (const char* accel : {"embree", "agglomerative"})
+  for (const char* accel : lumicut::test::backends())
     for (const std::string& id : integrator_ids()) {
       Host host;
       host.accel = accel;
@@ -380,7 +382,7 @@ TEST(InstructionSets, GoOnWhereTheyRoundAlike) {
   const api::Device device(2);
   Host host;
   std::vector<uint8_t> from[2];
-  for (const int embree : {0, 1})
+  for (int embree = 0; embree <= int{lumicut::test::kHasEmbree}; ++embree)
     host.accel = embree ? "embree" : "agglomerative", from[embree] = checkpoint(device, host);
   const auto refused = [&](int embree, int64_t best) {
     const BestInstructions limited(best);
@@ -391,11 +393,11 @@ TEST(InstructionSets, GoOnWhereTheyRoundAlike) {
   const int64_t targets = hwy::SupportedTargets() & HWY_TARGETS, best = targets & -targets;
   if (best > HWY_AVX2) GTEST_SKIP() << "this processor has no better instructions than SSE4";
   EXPECT_EQ(refused(0, HWY_AVX2), "");
-  for (const int embree : {0, 1})
+  for (int embree = 0; embree <= int{lumicut::test::kHasEmbree}; ++embree)
     EXPECT_NE(refused(embree, HWY_SSE4).find("this processor renders with SSE4 or older"), std::string::npos)
         << refused(embree, HWY_SSE4);
   // Embree picks its own instructions, and with AVX-512 other ones for reciprocals.
-  if (best <= HWY_AVX3) {
+  if (lumicut::test::kHasEmbree && best <= HWY_AVX3) {
     EXPECT_NE(refused(1, HWY_AVX2).find("made with AVX-512 instructions"), std::string::npos) << refused(1, HWY_AVX2);
   }
 }

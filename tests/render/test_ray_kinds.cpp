@@ -1,6 +1,7 @@
 // Meshes that some kinds of rays do not see.
 #include <gtest/gtest.h>
 
+#include "tests/support/backends.h"
 #include "tests/support/render.h"
 #include "tests/support/trimmed.h"
 
@@ -46,7 +47,7 @@ std::vector<Rgb> render(const Scene& scene, const std::string& id = "exhaustive"
 }
 
 class RayKinds : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Accels, RayKinds, testing::Values("bvh", "embree"));
+INSTANTIATE_TEST_SUITE_P(Accels, RayKinds, testing::ValuesIn(test::backends()));
 
 TEST_P(RayKinds, AMeshThatNoneSeesIsNotThere) {
   constexpr uint32_t kOther = 0x80000000u;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/error.h"
+#include "tests/support/backends.h"
 #include "tests/support/test_scenes.h"
 
 namespace lumicut {
@@ -105,7 +106,7 @@ TEST(Scene, CutOutsLetRaysThrough) {
 }
 
 TEST(Scene, WhatIsPartlyTransparentStopsItsShareOfTheRays) {
-  for (const char* kind : {"embree", "bvh"}) {
+  for (const char* kind : test::backends()) {
     Scene scene{{.accel = kind}};
     Material m;
     m.opacity = 0.3f;

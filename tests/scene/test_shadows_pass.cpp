@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "accel/host_accel.h"
+#include "tests/support/backends.h"
 #include "tests/support/test_scenes.h"
 #include "tests/support/trimmed.h"
 
@@ -132,7 +133,11 @@ size_t differing(const std::vector<uint8_t>& a, const std::vector<uint8_t>& b) {
 
 class ShadowsPass : public testing::TestWithParam<std::tuple<const char*, Place>> {};
 INSTANTIATE_TEST_SUITE_P(Backends, ShadowsPass,
-                         testing::Combine(testing::Values("bvh", "embree", "host"),
+                         testing::Combine(testing::ValuesIn([] {
+                                            auto all = test::backends();
+                                            all.push_back("host");
+                                            return all;
+                                          }()),
                                           testing::Values(Place::plain, Place::instanced)));
 
 TEST_P(ShadowsPass, ByFresnelsEquationsFromEitherSide) {
@@ -203,7 +208,7 @@ TEST(ShadowsPass, DimmedByColourOpacityAndTheShareOfGlass) {
 }
 
 TEST(ShadowsPass, ButForSurfacesBehindTheGlass) {
-  for (const char* backend : {"bvh", "embree"}) {
+  for (const char* backend : test::backends()) {
     Scene scene(Scene::Config{backend, true});
     Material clear = pane();
     clear.ior = 1.0f;

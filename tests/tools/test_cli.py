@@ -90,7 +90,7 @@ class Usage(Cli):
         self.assert_ends(self.render("-o", out, "--accel", "octree"), USAGE, "octree")
         self.assert_ends(self.render("-o", out, "--groups", "-i", "path_tracer"), USAGE, "--groups", "path_tracer")
         self.assert_ends(self.render("-o", out, "--builder", "magic"), USAGE, "magic", "binned-agglomerative")
-        self.assert_ends(self.render("-o", out, "--accel", "embree", "--builder", "sweep"), USAGE, "builder")
+        self.assert_ends(self.render("-o", out, "--accel", "embree", "--builder", "sweep"), USAGE, "embree")
         self.assert_ends(self.render("-o", out, "--crop", "0,0,30,10"), USAGE, "0,0,30,10", "24 x 24")
         self.assert_ends(lumicut("render", SCENE, "-o", out, "--size", "24"), USAGE, "24")
         self.assert_ends(lumicut("render", SCENE, "-o", out, "--size", "24xx"), USAGE, "24xx")

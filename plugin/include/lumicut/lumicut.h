@@ -448,7 +448,7 @@ typedef struct lumicut_trace {
 typedef struct lumicut_accel_desc {
   uint32_t struct_size;
   uint32_t robust;         /* LUMICUT_ROBUST (default, also 0) or LUMICUT_FAST */
-  const char* kind;        /* "bvh" (default), the library's own ("agglomerative" is its name of before 1.3), or "embree" */
+  const char* kind;        /* "bvh" (default), the library's own ("agglomerative" is its name of before 1.3), or "embree" (LUMICUT_UNSUPPORTED where left out) */
   const char* builder;     /* "bvh" alone: see docs/embree_dropin.md; NULL: the default */
   const float* positions;  /* xyz */
   uint64_t position_count;
