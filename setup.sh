@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Installs what a fresh Debian 12 machine lacks to build and test Lumicut. Says what it installs; installs nothing twice.
+# ./setup.sh zip: what build_zip.sh needs alone.
 set -euo pipefail
 
 packages=(
@@ -17,6 +18,11 @@ packages=(
   chromium                                                              # a test opens the report's page
   blender xvfb xauth xdotool imagemagick libgl1-mesa-dri                # the Blender add-on's tests, with and without a window
 )
+case ${1-} in
+  '') ;;
+  zip) packages=(g++ cmake ninja-build python3 ca-certificates binutils libboost-dev) ;;
+  *) echo "setup: '$1' is neither empty nor 'zip'" >&2; exit 2 ;;
+esac
 
 missing=()
 for package in "${packages[@]}"; do

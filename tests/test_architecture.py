@@ -152,9 +152,12 @@ class Version(unittest.TestCase):
 class Decisions(unittest.TestCase):
     def test_each_is_numbered_dated_and_in_the_index_in_order(self):
         folder = ROOT / "docs/decisions"
-        rows = []
-        for number, page in enumerate(sorted(p for p in folder.glob("*.md") if p.name != "README.md"), 1):
-            self.assertRegex(page.name, rf"^{number:04d}-[a-z0-9-]+\.md$")
+        rows, numbers = [], []
+        for page in sorted(p for p in folder.glob("*.md") if p.name != "README.md"):
+            self.assertRegex(page.name, r"^\d{4}-[a-z0-9-]+\.md$")
+            number = int(page.name[:4])
+            self.assertNotIn(number, numbers)
+            numbers.append(number)
             match = re.match(r"# (.+)\n\nDecided on (\d{4}-\d\d-\d\d)\.\n", page.read_text())
             self.assertTrue(match, page.name)
             rows.append(f"| [{number:04d}]({page.name}) | {match[1]} | {match[2]} |")

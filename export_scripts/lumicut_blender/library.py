@@ -331,8 +331,10 @@ class Library:
                 continue
             self.origin, self.path = origin, path
             return
-        raise LibraryMissing("no usable Lumicut library. Tried " + " | ".join(tried) +
-                             ". Install the zip that holds it, or name its file in the add-on's preferences")
+        bundled = any(line.startswith("bundled") for line in tried)
+        cure = ("Restart Blender if the add-on was just updated. Otherwise install the zip that build_zip.sh makes, whose library needs "
+                "nothing of the machine," if bundled else "Install the zip that holds it,")
+        raise LibraryMissing("no usable Lumicut library. Tried " + " | ".join(tried) + f". {cure} or name its file in the add-on's preferences")
 
     def check(self, code):
         if code == OK:

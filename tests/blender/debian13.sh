@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Runs Blender's headless tests on Debian 13 (Blender 4.3.2, Embree 4): a tree made with debootstrap, entered with chroot.
 # Usage, as root: tests/blender/debian13.sh [TREE] [suite ...]; TREE (default build/debian13) is made once and kept.
-# The whole network that it needs is Debian's mirror.
+# The whole network that it needs is Debian's mirror. ZIP=FILE tests that zip of the add-on as it is, with its own library:
+# nothing is built, and a new tree gets Blender and no development package.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 tree=${1:-$root/build/debian13}
@@ -14,6 +15,7 @@ command -v debootstrap >/dev/null || { echo "debian13: install debootstrap first
 packages=(blender libembree-dev libtbb-dev libhwy-dev cmake ninja-build g++ python3 python3-numpy pkg-config
           nlohmann-json3-dev libboost-dev libfmt-dev libcli11-dev libopenexr-dev libimath-dev libopenimageio-dev openimageio-tools
           python3-openimageio libtinyobjloader-dev)
+[ -z "${ZIP-}" ] || packages=(blender python3 python3-numpy)
 
 if [ ! -x "$tree/usr/bin/dpkg" ]; then
   mkdir -p "$tree"
@@ -36,6 +38,14 @@ mountpoint -q "$tree/proc" || mount -t proc proc "$tree/proc"
 mountpoint -q "$tree/dev" || mount --bind /dev "$tree/dev"  # not its submounts: unmounting them would reach the host's
 mountpoint -q "$tree/src" || mount --bind -o ro "$root" "$tree/src"
 
+if [ -n "${ZIP-}" ]; then
+  cp "$ZIP" "$tree/build/"
+  chroot "$tree" blender --version | head -1
+  chroot "$tree" dpkg-query -W '*tbb*-dev' '*embree*-dev' 'libhwy-dev' 'cmake' 2>/dev/null || echo "no development package of what the library uses"
+  chroot "$tree" env LUMICUT_ZIP="/build/${ZIP##*/}" LUMICUT_SOURCE_DIR=/src LUMICUT_BINARY_DIR=/build PYTHONDONTWRITEBYTECODE=1 \
+    python3 /src/tests/blender/test_blender.py -v "${suites[@]}"
+  exit
+fi
 chroot "$tree" cmake -S /src -B /build -G Ninja -DCMAKE_BUILD_TYPE=Release \
   -DLUMICUT_BUILD_TESTS=OFF -DLUMICUT_BUILD_BENCH=OFF -DLUMICUT_BUILD_GEOMETRY_CGAL=OFF
 # TARGETS=lumicut_blender_zip leaves the command out, and with it the tests that compare F12 with the command.

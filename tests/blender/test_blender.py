@@ -13,12 +13,15 @@ import sys
 import tempfile
 import threading
 import unittest
+import zipfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = pathlib.Path(os.environ.get("LUMICUT_SOURCE_DIR", HERE.parents[1]))
 BUILD = pathlib.Path(os.environ.get("LUMICUT_BINARY_DIR", ROOT / "build/release"))
 BLENDER = os.environ.get("LUMICUT_BLENDER") or shutil.which("blender")
-LIBRARY = BUILD / "lib/liblumicut.so"
+# A zip to test in place of the sources and the build beside them.
+ZIP = os.environ.get("LUMICUT_ZIP")
+LIBRARY = None if ZIP else BUILD / "lib/liblumicut.so"
 PATIENCE = 900  # seconds until a hanging Blender is killed: not a measure of anything
 
 BATCHES = {
@@ -39,7 +42,9 @@ class Home:
         self.folder = tempfile.TemporaryDirectory(prefix="lumicut_home_")
         self.path = pathlib.Path(self.folder.name)
         (self.path / "scripts/addons").mkdir(parents=True)
-        if addon:
+        if addon and ZIP:
+            shutil.unpack_archive(ZIP, self.path / "scripts/addons")
+        elif addon:
             (self.path / "scripts/addons/lumicut_blender").symlink_to(ROOT / "export_scripts/lumicut_blender")
 
     def environment(self, library=LIBRARY):
@@ -129,6 +134,7 @@ class Farms(Blender):
         self.assertEqual(done.returncode, 1, done.stdout)
         self.assertIsNone(image)
 
+    @unittest.skipIf(ZIP, "the zip's own library is there")
     def test_a_missing_library_ends_with_1_no_image_and_says_what_was_tried(self):
         blend = make_room(self.home)
         done, image = farm(self.home, blend, library="/nowhere/liblumicut.so.1")
@@ -136,6 +142,7 @@ class Farms(Blender):
         self.assertIsNone(image)
         self.assertRegex(done.stdout, r"no usable Lumicut library.*/nowhere/liblumicut\.so\.1")
 
+    @unittest.skipIf(ZIP, "the zip's own library is there")
     def test_a_library_of_another_abi_is_refused_by_number(self):
         names = re.findall(r'^    "(\w+)": \(', (ROOT / "export_scripts/lumicut_blender/library.py").read_text(), re.M)
         self.assertGreater(len(names), 20)
@@ -207,15 +214,92 @@ class Interruption(Blender):
         self.interrupt(r"light paths", settings="'lightcuts', vpls=50000000")
 
 
+def blender_version():
+    text = subprocess.run([BLENDER, "-b", "--version"], capture_output=True, text=True, errors="replace").stdout
+    return tuple(map(int, re.search(r"Blender (\d+)\.(\d+)", text).groups()))
+
+
+def older(archive, path):
+    """The zip as of version 0.9.0."""
+    with zipfile.ZipFile(archive) as source, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as out:
+        for name in source.namelist():
+            content = source.read(name)
+            if name.endswith("blender_manifest.toml"):
+                content, count = re.subn(rb'^version = "[\d.]+"', b'version = "0.9.0"', content, flags=re.M)
+                assert count == 1
+            if name.endswith("__init__.py"):
+                content, count = re.subn(rb'"version": \([\d, ]+\)', b'"version": (0, 9, 0)', content)
+                assert count == 1
+            out.writestr(name, content)
+    return path
+
+
 class TheZip(Blender):
     def setUp(self):
         self.home = Home(addon=False)
         self.addCleanup(self.home.folder.cleanup)
+        self.archive = ZIP or next(iter(sorted(BUILD.glob("lumicut_blender-*.zip"))), None)
+        if self.archive is None:
+            self.skipTest(f"no zip in {BUILD}: build lumicut_blender_zip")
+
+    def test_an_update_over_an_older_version_keeps_preferences(self):
+        old = older(self.archive, self.home.path / "old.zip")
+        first = ("import bpy, sys\nbpy.ops.preferences.addon_install(filepath={path!r}, overwrite=True)\n"
+                 "bpy.ops.preferences.addon_enable(module='lumicut_blender')\n"
+                 "print('version', sys.modules['lumicut_blender'].bl_info['version'])\n"
+                 "p = bpy.context.preferences.addons['lumicut_blender'].preferences\n{then}")
+        done = self.home.python(first.format(path=str(old), then="p.library_path = '/a/place'\nbpy.ops.wm.save_userpref()"), library=None)
+        self.assertEqual(done.returncode, 0, done.stdout)
+        self.assertIn("version (0, 9, 0)", done.stdout)
+        script = self.home.path / "update.py"
+        script.write_text(first.format(path=str(self.archive), then="assert p.library_path == '/a/place', p.library_path"))
+        done = self.home.run("--python-exit-code", 7, "-P", script, library=None)  # with the user's preferences
+        self.assertEqual(done.returncode, 0, done.stdout)
+        self.assertNotIn("version (0, 9, 0)", done.stdout)
+
+    def extension(self, *words):
+        """`blender --command extension`, as this home's user."""
+        env = self.home.environment(library=None) | {"BLENDER_USER_EXTENSIONS": str(self.home.path / "extensions")}
+        return subprocess.run([BLENDER, "--command", "extension", *map(str, words)], env=env, cwd=self.home.path, stdin=subprocess.DEVNULL,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", timeout=PATIENCE)
+
+    def in_extension(self, code):
+        script = self.home.path / "script.py"
+        script.write_text("import bpy\nNAME = 'bl_ext.user_default.lumicut_blender'\n"
+                          "p = bpy.context.preferences.addons[NAME].preferences\n" + code)
+        done = self.home.run("--python-exit-code", 7, "-P", script, library=None)
+        self.assertEqual(done.returncode, 0, done.stdout)
+
+    def test_it_is_an_extension_that_validates_installs_renders_and_updates(self):
+        if blender_version() < (4, 2):
+            self.skipTest("extensions came with Blender 4.2")
+        done = self.extension("validate", self.archive)
+        self.assertEqual(done.returncode, 0, done.stdout)
+        self.assertIn("Success", done.stdout)
+        install = ("install-file", "-r", "user_default", "-e")
+        done = self.extension(*install, older(self.archive, self.home.path / "old.zip"))
+        self.assertIn("Installed", done.stdout)
+        self.in_extension("p.library_path = '/a/place'\nbpy.ops.wm.save_userpref()\n")
+        done = self.extension(*install, self.archive)
+        self.assertIn("einstalled", done.stdout)
+        image = self.home.path / "image.png"
+        self.in_extension(f"""
+assert p.library_path == '/a/place', p.library_path
+import importlib, pathlib
+runtime = importlib.import_module(NAME + '.runtime')
+assert runtime.require().origin == 'bundled with the add-on', runtime.require().origin
+manifest = pathlib.Path(runtime.__file__).with_name('blender_manifest.toml').read_text()
+assert 'version = "0.9.0"' not in manifest
+scene = bpy.context.scene
+scene.render.engine = 'LUMICUT'
+scene.render.resolution_x = scene.render.resolution_y = 32
+scene.render.filepath = {str(image)!r}
+bpy.ops.render.render(write_still=True)
+""")
+        self.assertTrue(image.exists())
 
     def test_it_installs_renders_and_exports_without_a_window(self):
-        archive = next(iter(sorted(BUILD.glob("lumicut_blender-*.zip"))), None)
-        if archive is None:
-            self.skipTest(f"no zip in {BUILD}: build lumicut_blender_zip")
+        archive = self.archive
         done = self.home.python(
             f"import bpy\nbpy.ops.preferences.addon_install(filepath={str(archive)!r})\n"
             "assert bpy.ops.preferences.addon_enable(module='lumicut_blender') == {'FINISHED'}\n"
