@@ -20,14 +20,35 @@ std::span<const ChannelInfo> channel_table() {
       {Channel::error, "error", 1,
        "Half the width of the confidence interval of the luminance, W/(sr m2); 0 before two passes"},
       {Channel::illuminance, "illuminance", 1, "Illuminance of the side that is seen, lux; 0 unless asked for"},
+      {Channel::residual, "residual", 3,
+       "Part of the radiance whose noise is each pixel's own, W/(sr m2); 0 unless denoised"},
+      {Channel::denoising_albedo, "denoising_albedo", 3,
+       "Reflectance of what is seen, by way of mirrors and smooth glass too; 0 unless denoised"},
+      {Channel::denoising_normal, "denoising_normal", 3,
+       "Its normal in world space, mean over the pixel; 0 unless denoised"},
+      {Channel::denoising_depth, "denoising_depth", 1,
+       "Way to it along the camera's axis, scene units, mean over the pixel; 0 unless denoised"},
+      {Channel::denoising_color, "denoising_color", 3,
+       "Radiance with fireflies spread over their surroundings: a denoiser's input; 0 unless denoised"},
+      {Channel::denoised, "denoised", 3, "Denoised radiance; before the last pass the plain one; 0 unless denoised"},
+      {Channel::denoised_error, "denoised_error", 1,
+       "As error, of the denoised radiance, with what denoising blurs; 0 unless denoised"},
   };
   return table;
 }
 
-Film::Film(Rect crop, std::vector<uint32_t> groups) : crop_(crop), groups_(std::move(groups)) {
+uint64_t film_pixel_bytes(size_t groups, bool denoised) {
+  uint64_t components = 3 * groups;
+  for (const ChannelInfo& c : channel_table())
+    if (denoised || !of_denoising(c.channel)) components += c.components;
+  return components * sizeof(float);
+}
+
+Film::Film(Rect crop, std::vector<uint32_t> groups, bool denoised) : crop_(crop), groups_(std::move(groups)) {
   const size_t pixels = size_t{crop.width()} * crop.height();
   for (const ChannelInfo& c : channel_table())
-    planes_[static_cast<size_t>(c.channel)].assign(pixels * c.components, 0.0f);
+    if (denoised || !of_denoising(c.channel))
+      planes_[static_cast<size_t>(c.channel)].assign(pixels * c.components, 0.0f);
   group_planes_.resize(groups_.size());
   for (std::vector<float>& plane : group_planes_) plane.assign(3 * pixels, 0.0f);
 }
@@ -65,6 +86,7 @@ void Film::read(Channel channel, const Rect& rect, float* out) const {
   const auto c = static_cast<size_t>(channel);
   const size_t components = channel_table()[c].components;
   const size_t row = size_t{rect.width()} * components;
+  if (!has(channel)) return std::fill_n(out, row * rect.height(), 0.0f), void();
   for (uint32_t y = rect.y0; y < rect.y1; ++y) {
     const size_t first = (size_t{y - crop_.y0} * crop_.width() + (rect.x0 - crop_.x0)) * components;
     std::memcpy(out + (y - rect.y0) * row, planes_[c].data() + first, row * sizeof(float));

@@ -23,8 +23,19 @@ enum class Channel : uint32_t {
   rays,
   bounds,
   error,
-  illuminance
+  illuminance,
+  residual,
+  denoising_albedo,
+  denoising_normal,
+  denoising_depth,
+  denoising_color,
+  denoised,
+  denoised_error
 };
+// Those that only a film that is denoised has.
+constexpr bool of_denoising(Channel c) { return c >= Channel::residual; }
+// Those of them that follow from all iterations together.
+constexpr bool made_by_denoising(Channel c) { return c >= Channel::denoising_color; }
 
 struct ChannelInfo {
   Channel channel;
@@ -43,11 +54,15 @@ struct Rect {
   LUMICUT_FIELDS(Rect, x0, y0, x1, y1)
 };
 
+// Bytes of a film for each pixel.
+uint64_t film_pixel_bytes(size_t groups, bool denoised);
+
 class Film {
  public:
   // `groups`: light groups that have a plane of radiance of their own, rising.
-  explicit Film(Rect crop, std::vector<uint32_t> groups = {});
+  explicit Film(Rect crop, std::vector<uint32_t> groups = {}, bool denoised = false);
   const Rect& crop() const { return crop_; }
+  bool has(Channel channel) const { return !planes_[static_cast<size_t>(channel)].empty(); }
   const std::vector<uint32_t>& groups() const { return groups_; }
   // Radiance that the light of one group brings; `index` into groups().
   float* group_pixel(size_t index, uint32_t x, uint32_t y) {
@@ -78,7 +93,7 @@ class Film {
 
  private:
   Rect crop_;
-  std::vector<float> planes_[11];
+  std::vector<float> planes_[18];
   std::vector<uint32_t> groups_;
   std::vector<std::vector<float>> group_planes_;
 };

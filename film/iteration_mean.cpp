@@ -12,8 +12,11 @@ double student_t(double confidence, uint64_t n) {
   return boost::math::quantile(t, 0.5 + 0.5 * confidence);
 }
 
-IterationMean::IterationMean(const Rect& crop, double confidence)
-    : crop_(crop), confidence_(confidence), sums_(size_t{crop.width()} * crop.height()) {}
+IterationMean::IterationMean(const Rect& crop, double confidence, bool denoised)
+    : crop_(crop),
+      confidence_(confidence),
+      sums_(size_t{crop.width()} * crop.height()),
+      residuals_(denoised ? sums_.size() : 0) {}
 
 void IterationMean::add(const Film& pass, const Rect& rect, uint64_t passes, Film& mean) {
   const auto n = static_cast<double>(passes);
@@ -27,16 +30,24 @@ void IterationMean::add(const Film& pass, const Rect& rect, uint64_t passes, Fil
       s.mean += away / n;
       s.squares += away * (value - s.mean);
       for (int k = 0; k < 3; ++k) s.radiance[k] += radiance[k];
+      if (!residuals_.empty()) {
+        const float* residual = pass.pixel(Channel::residual, x, y);
+        residuals_[index(x, y)].add({residual[0], residual[1], residual[2]}, {radiance[0], radiance[1], radiance[2]},
+                                    passes);
+      }
       for (size_t g = 0; g < mean.groups().size(); ++g) {
         const float* in = pass.group_pixel(g, x, y);
         float* out = mean.group_pixel(g, x, y);
         for (int k = 0; k < 3; ++k) out[k] += (in[k] - out[k]) * share;
       }
       for (const ChannelInfo& c : channel_table()) {
+        if (!mean.has(c.channel)) continue;
         float* out = mean.pixel(c.channel, x, y);
         if (c.channel == Channel::radiance) {
           for (int k = 0; k < 3; ++k) out[k] = static_cast<float>(s.radiance[k] / n);
-        } else if (c.channel != Channel::error) {
+        } else if (c.channel == Channel::denoised || c.channel == Channel::denoising_color) {
+          for (int k = 0; k < 3; ++k) out[k] = static_cast<float>(s.radiance[k] / n);  // until the end
+        } else if (c.channel != Channel::error && c.channel != Channel::denoised_error) {
           const bool first = c.channel == Channel::depth || c.channel == Channel::position;
           const float* in = pass.pixel(c.channel, x, y);
           for (uint32_t k = 0; k < c.components; ++k)
@@ -79,14 +90,18 @@ double IterationMean::error(const Film& mean, uint64_t passes) const {
 }
 
 void IterationMean::save(std::vector<uint8_t>& out) const {
-  const size_t start = out.size(), bytes = sums_.size() * sizeof(Sums);
-  out.resize(start + bytes);
-  std::memcpy(out.data() + start, sums_.data(), bytes);
+  const auto add = [&](const auto& values) {
+    const auto* bytes = reinterpret_cast<const uint8_t*>(values.data());
+    out.insert(out.end(), bytes, bytes + values.size() * sizeof(values[0]));
+  };
+  add(sums_), add(residuals_);
 }
 
 bool IterationMean::load(std::span<const uint8_t> bytes) {
-  if (bytes.size() != sums_.size() * sizeof(Sums)) return false;
-  std::memcpy(sums_.data(), bytes.data(), bytes.size());
+  const size_t of_sums = sums_.size() * sizeof(Sums), of_residuals = residuals_.size() * sizeof(ResidualSums);
+  if (bytes.size() != of_sums + of_residuals) return false;
+  std::memcpy(sums_.data(), bytes.data(), of_sums);
+  if (of_residuals > 0) std::memcpy(residuals_.data(), bytes.data() + of_sums, of_residuals);
   return true;
 }
 

@@ -2,9 +2,11 @@
 // for each pixel by Student's t. [Student 1908; for many lights after Nabata et al. 2016]
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "film/film.h"
+#include "film/residual_sums.h"
 
 namespace lumicut {
 
@@ -13,7 +15,8 @@ double student_t(double confidence, uint64_t n);
 
 class IterationMean {
  public:
-  explicit IterationMean(const Rect& crop, double confidence);
+  // `denoised`: keeps what denoising goes by.
+  IterationMean(const Rect& crop, double confidence, bool denoised);
 
   // What `pass` holds inside `rect` joins the mean; `passes`: with this one. Keeps `mean` up to date: depth and
   // position stay those of the first pass. Rectangles of one pass may be added concurrently.
@@ -27,6 +30,9 @@ class IterationMean {
   // luminance, or of a tenth of the image's mean where that is larger. Infinite before two passes.
   double error(const Film& mean, uint64_t passes) const;
 
+  // Of each pixel, rows from the top; empty where it is not denoised.
+  std::span<const ResidualSums> residuals() const { return residuals_; }
+
   // State after whole passes, and back: false where the size does not fit.
   void save(std::vector<uint8_t>& out) const;
   bool load(std::span<const uint8_t> bytes);
@@ -38,7 +44,8 @@ class IterationMean {
   };
 
  public:
-  static constexpr size_t kBytes = sizeof(Sums);  // a pixel, also as saved
+  // Of a pixel, also as saved.
+  static constexpr size_t pixel_bytes(bool denoised) { return sizeof(Sums) + (denoised ? sizeof(ResidualSums) : 0); }
 
  private:
   size_t index(uint32_t x, uint32_t y) const { return size_t{y - crop_.y0} * crop_.width() + (x - crop_.x0); }
@@ -46,6 +53,7 @@ class IterationMean {
   Rect crop_;
   double confidence_;
   std::vector<Sums> sums_;
+  std::vector<ResidualSums> residuals_;
 };
 
 }  // namespace lumicut

@@ -42,6 +42,10 @@ class Integrator {
   // treat points alone, large for those that cluster them.
   virtual size_t batch_size() const { return 4096; }
 
+  // Whether lights or paths are drawn for each point anew, so that neighbours' errors are independent: denoising averages
+  // them out.
+  virtual bool chooses_at_each_point() const { return false; }
+
   // What `prepare` made, as bytes that `load_state` takes back in its place: the same scene, lights and parameters give
   // the same radiance. Bytes may come from anywhere: what does not fit throws Error(invalid_argument). By default both
   // throw Error(unsupported).

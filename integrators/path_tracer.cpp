@@ -37,6 +37,7 @@ class PathTracer final : public Integrator {
     delta_ = DiscreteDistribution(power);
   }
 
+  bool chooses_at_each_point() const override { return true; }
   void shade(const ShadePoints& points, std::span<Rgb> radiance, std::span<PointCounts> counts,
              ShadeContext context) const override {
     parallel_chunks(points.size(), kChunk, [&](size_t begin, size_t end) {

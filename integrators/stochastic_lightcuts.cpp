@@ -62,6 +62,7 @@ class StochasticLightcuts final : public Integrator {
     context.stats.set_value("light_tree_bytes", static_cast<double>(tree_.bytes()));
   }
 
+  bool chooses_at_each_point() const override { return true; }
   void shade(const ShadePoints& points, std::span<Rgb> radiance, std::span<PointCounts> counts,
              ShadeContext context) const override {
     parallel_chunks(points.size(), 16 * kLanes, [&](size_t begin, size_t end) {

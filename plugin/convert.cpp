@@ -564,6 +564,7 @@ FrameOptions to_frame_options(const lumicut_render_desc& in) {
   o.width = in.width, o.height = in.height;
   o.samples = in.samples == 0 ? 1 : in.samples;
   o.illuminance = (in.flags & LUMICUT_ILLUMINANCE) != 0;
+  o.denoise = (in.flags & LUMICUT_DENOISE) != 0;
   // A batch holds at least a tile's samples: tiles shrink rather than let memory grow with the samples.
   const auto tile_points = [&] { return uint64_t{o.tile_size} * o.tile_size * o.samples; };
   o.tile_size = in.tile_size == 0 ? 64 : in.tile_size;
@@ -590,7 +591,8 @@ IterationOptions to_pass_options(const lumicut_render_desc& in) {
   c.not_negative("max_seconds", in.max_seconds);
   c.range("target_error", in.target_error, 0.0f, 1e6f);
   c.range("confidence", in.confidence, 0.0f, 0.999999f);
-  c.flags("flags", in.flags, LUMICUT_CHECKPOINTS | LUMICUT_ILLUMINANCE | LUMICUT_GROUPS);
+  c.flags("flags", in.flags,
+          LUMICUT_CHECKPOINTS | LUMICUT_ILLUMINANCE | LUMICUT_GROUPS | LUMICUT_DENOISE | LUMICUT_KEEP_FIREFLIES);
   if (in.checkpoint != nullptr && in.checkpoint_size == 0) c.fail("checkpoint_size", "0 bytes are no checkpoint");
   c.integer("checkpoint_size", in.checkpoint_size, 0, kMostCheckpointBytes);
   if (in.checkpoint == nullptr && in.checkpoint_size != 0)
@@ -601,6 +603,7 @@ IterationOptions to_pass_options(const lumicut_render_desc& in) {
   o.count = in.passes > 0 ? in.passes : (in.max_seconds > 0.0f || in.target_error > 0.0f ? 0 : 1);
   o.groups = (in.flags & LUMICUT_GROUPS) != 0;
   o.checkpoints = (in.flags & LUMICUT_CHECKPOINTS) != 0;
+  o.keep_fireflies = (in.flags & LUMICUT_KEEP_FIREFLIES) != 0;
   if (in.checkpoint != nullptr) {
     const auto* bytes = static_cast<const uint8_t*>(in.checkpoint);
     o.resume.assign(bytes, bytes + in.checkpoint_size);

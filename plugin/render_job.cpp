@@ -36,7 +36,7 @@ lumicut_render_t::lumicut_render_t(lumicut_integrator_t& integrator, lumicut_sce
   if (groups.size() > kMaxGroups)
     fail_argument("lumicut_render_desc.flags: LUMICUT_GROUPS with " + number_text(uint64_t{groups.size()}) +
                   " light groups; at most " + number_text(uint64_t{kMaxGroups}) + " can be told apart in one render");
-  const uint64_t bytes = render_bytes(o.crop, iterations, groups.size());
+  const uint64_t bytes = render_bytes(o.crop, iterations, groups.size(), o.denoise);
   check_render_bytes(o.crop, bytes);
   stats.set_value("estimated_bytes", static_cast<double>(bytes));
   loop_ = std::make_unique<RenderLoop>(integrator, scene.scene, owner_of(scene), o, std::move(iterations),

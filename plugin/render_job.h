@@ -28,11 +28,14 @@ struct lumicut_render_t : lumicut::ObjectOf<lumicut_render_t> {
   lumicut::Rect next_tile();
   // State after the last whole pass; stays until the next call.
   const std::vector<uint8_t>& checkpoint();
-  // Tiles that are not done yet read as 0.
+  // Tiles that are not done yet read as 0, and so do channels that were not asked for.
   void read(const lumicut::ChannelInfo& channel, const lumicut::Rect& rect, float* out) {
     loop_->read([&](const lumicut::Film& film) {
-      read_plane(rect, channel.components, out,
-                 [&](uint32_t x, uint32_t y) { return film.pixel(channel.channel, x, y); });
+      if (!film.has(channel.channel))
+        std::fill_n(out, size_t{rect.width()} * rect.height() * channel.components, 0.0f);
+      else
+        read_plane(rect, channel.components, out,
+                   [&](uint32_t x, uint32_t y) { return film.pixel(channel.channel, x, y); });
     });
   }
   // The same of one light group; `index` into groups().

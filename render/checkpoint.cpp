@@ -11,7 +11,7 @@ namespace {
 
 constexpr char kMagic[8] = {'L', 'U', 'M', 'I', 'C', 'U', 'T', 'P'};
 constexpr char kInstructions[] = "instructions";
-constexpr uint32_t kVersion = 2, kByteOrder = 0x01020304u;
+constexpr uint32_t kVersion = 3, kByteOrder = 0x01020304u;
 
 struct Header {
   char magic[8];
@@ -36,7 +36,8 @@ std::vector<uint8_t> save_checkpoint(const std::string& key, uint32_t done, cons
   std::vector<uint8_t> bytes;
   const uint64_t pixels = uint64_t{film.crop().width()} * film.crop().height();
   bytes.reserve(sizeof(Header) + key.size() +
-                pixels * (IterationMean::kBytes + film_pixel_bytes(film.groups().size())));
+                pixels * (IterationMean::pixel_bytes(film.has(Channel::denoised)) +
+                          film_pixel_bytes(film.groups().size(), film.has(Channel::denoised))));
   bytes.resize(sizeof(Header));
   bytes.insert(bytes.end(), key.begin(), key.end());
   mean.save(bytes);
@@ -58,7 +59,8 @@ uint32_t load_checkpoint(const std::vector<uint8_t>& bytes, const std::string& k
   std::memcpy(&h, bytes.data(), sizeof(h));
   if (std::memcmp(h.magic, kMagic, sizeof(kMagic)) != 0) fail_checkpoint("it does not begin as one");
   if (h.version != kVersion || h.byte_order != kByteOrder)
-    fail_checkpoint("it is of version " + number_text(uint64_t{h.version}) + " or of another kind of machine");
+    fail_checkpoint("it is of version " + number_text(uint64_t{h.version}) + " instead of " +
+                    number_text(uint64_t{kVersion}) + ", or of another kind of machine: begin anew");
   const auto body = std::span(bytes).subspan(sizeof(h));
   if (h.key_bytes > body.size() || h.mean_bytes > body.size() - h.key_bytes ||
       h.film_bytes != body.size() - h.key_bytes - h.mean_bytes || h.checksum != checksum(h, body))
@@ -79,7 +81,7 @@ uint32_t load_checkpoint(const std::vector<uint8_t>& bytes, const std::string& k
 std::string checkpoint_key(const Scene& scene, const std::string& integrator, const Params& params,
                            const VplSet* host_lights, const FrameOptions& frame, const IterationOptions& options) {
   // What is not added stops the render, or does not touch the image.
-  const auto& [count, max_seconds, target_error, confidence, checkpoints, groups, resume] = options;
+  const auto& [count, max_seconds, target_error, confidence, checkpoints, groups, keep_fireflies, resume] = options;
   Identity key;
   key.add("version", std::string(LUMICUT_VERSION_TEXT));
   key.add("integrator", integrator);

@@ -7,6 +7,7 @@
 #include "core/parallel.h"
 #include "core/rng.h"
 #include "render/clamp_compensation.h"
+#include "render/denoising_features.h"
 
 namespace lumicut {
 
@@ -66,6 +67,7 @@ class Batch {
   void collect(ShadeContext context) {
     const size_t samples = options_.samples;
     sums_.resize(pixels_.size());
+    if (options_.denoise) features_.emplace(scene_, pixels_.size());
     std::vector<SurfacePoint> found(pixels_.size() * samples);
     std::vector<uint8_t> hit(found.size(), 0);
     const size_t most_further = scene_.most_layers() - 1;
@@ -79,16 +81,19 @@ class Batch {
       for (size_t p = begin; p < end; ++p)
         camera_rays(p, rays.data() + (p - begin) * samples, cosines.data() + (p - begin) * samples);
       if (!scene_.bounds().empty()) scene_.accel().intersect(rays);
+      std::vector<FeatureTracer::Way> ways;
       for (size_t i = 0; i < rays.size(); ++i) {
         const size_t p = begin + i / samples;
         const size_t at = begin * samples + i;
         if (rays[i].hit.geom == kNoId) {
           miss(rays[i], p);
+          if (features_) features_->miss(static_cast<uint32_t>(p), rays[i].ray.dir);
           continue;
         }
         const SurfaceInteraction seen = scene_.interaction(rays[i], static_cast<uint32_t>(p));
         if (scene_.materials()[seen.material].holdout) continue;
         first_hit(seen, p, cosines[i]);
+        if (features_) features_->hit(static_cast<uint32_t>(p), seen, cosines[i], ways);
         const auto layers = seen.bsdf.layers();
         hit[at] = 1, found[at] = layers[0];
         if (layers.size() > 1) {
@@ -97,6 +102,10 @@ class Batch {
         }
         if (seen.bsdf.is_specular()) chain[at] = start_chain_of(seen.bsdf, p, i % samples);
       }
+      if (ways.empty()) return;
+      Counters counters;
+      features_->follow(std::move(ways), context.progress, counters);
+      context.stats.add(counters);
     });
     context.progress.check();
     points_.reserve(found.size());
@@ -123,9 +132,13 @@ class Batch {
   void shade(const NearbyLights* nearby, const ClampCompensation* compensation, ShadeContext context) {
     light_.assign(methods_.size(), std::vector<Rgb>(pixels_.size()));
     counts_.assign(pixels_.size(), {});
-    shade_levels(points_, nearby, compensation, light_, context);
+    if (options_.denoise) residual_.assign(pixels_.size(), {});
+    shade_levels(points_, nearby, compensation, light_, context, options_.denoise ? Noise::beside_lights : Noise::none);
     for (size_t i = 0; i < seen_.light.size(); ++i) light_[slot(seen_.group[i])][seen_.pixel[i]] += seen_.light[i];
-    if (!seen_.found.empty()) shade_levels(seen_.points(), nearby, compensation, light_, context);
+    if (options_.denoise)
+      for (size_t i = 0; i < seen_.light.size(); ++i) residual_[seen_.pixel[i]] += seen_.light[i];
+    if (!seen_.found.empty())
+      shade_levels(seen_.points(), nearby, compensation, light_, context, options_.denoise ? Noise::all : Noise::none);
     if (!options_.illuminance) return;
     // White Lambert surfaces show the irradiance over π.
     ShadePoints white;
@@ -141,7 +154,7 @@ class Batch {
     }
     white.finish();
     std::vector<std::vector<Rgb>> shown(methods_.size(), std::vector<Rgb>(pixels_.size()));
-    shade_levels(white, nearby, compensation, shown, context);
+    shade_levels(white, nearby, compensation, shown, context, Noise::none);
     illuminance_.assign(pixels_.size(), 0.0f);
     for (const auto& of_group : shown)
       for (size_t p = 0; p < pixels_.size(); ++p)
@@ -164,6 +177,15 @@ class Batch {
         std::copy_n(&(of_group *= scale).x, 3, film.group_pixel(g, x, y));
       }
       if (options_.illuminance) film.set(Channel::illuminance, x, y, s.hits > 0.0f ? illuminance_[p] / s.hits : 0.0f);
+      if (options_.denoise) {
+        const DenoisingFeatures& f = features_->sum(p);
+        film.set(Channel::residual, x, y, residual_[p] * scale);
+        film.set(Channel::denoising_albedo, x, y, f.albedo * scale);
+        film.set(Channel::denoising_normal, x, y, f.normal * scale);
+        film.set(Channel::denoising_depth, x, y, f.depth * scale);
+        film.set(Channel::denoising_color, x, y, all * scale);
+        film.set(Channel::denoised, x, y, all * scale);
+      }
       film.set(Channel::alpha, x, y, s.hits * scale);
       film.set(Channel::depth, x, y, s.depth);
       film.set(Channel::normal, x, y, normalize(s.normal));
@@ -182,13 +204,17 @@ class Batch {
   // Chance ends chains long before.
   static constexpr uint32_t kMaxLevels = 64;
 
+  // What of the light is `residual_`, whose noise neighbours do not share: all but what virtual lights bring to the first
+  // points, unless the method chooses them anew at each.
+  enum class Noise { none, beside_lights, all };
+
   void shade_levels(const ShadePoints& first, const NearbyLights* nearby, const ClampCompensation* compensation,
-                    std::vector<std::vector<Rgb>>& light, ShadeContext context) {
+                    std::vector<std::vector<Rgb>>& light, ShadeContext context, Noise noise) {
     const ShadePoints* points = &first;
     ShadePoints found;
     for (uint32_t level = 1; level <= kMaxLevels && points->size() > 0; ++level) {
       context.progress.check();
-      add_light(*points, light, context);
+      add_light(*points, light, context, noise, level);
       Counters counters;
       TracedPoints hits;
       if (nearby != nullptr)
@@ -196,6 +222,8 @@ class Batch {
       if (compensation != nullptr) compensation->trace(*points, level, context.progress, hits, counters);
       context.stats.add(counters);
       for (size_t i = 0; i < hits.light.size(); ++i) light[slot(hits.group[i])][hits.pixel[i]] += hits.light[i];
+      if (noise != Noise::none)
+        for (size_t i = 0; i < hits.light.size(); ++i) residual_[hits.pixel[i]] += hits.light[i];
       if (compensation == nullptr) return;
       found = hits.points();
       points = &found;
@@ -209,13 +237,18 @@ class Batch {
     return g;
   }
 
-  void add_light(const ShadePoints& points, std::vector<std::vector<Rgb>>& light, ShadeContext context) {
+  void add_light(const ShadePoints& points, std::vector<std::vector<Rgb>>& light, ShadeContext context, Noise noise,
+                 uint32_t level) {
     if (points.size() == 0) return;
     std::vector<Rgb> radiance(points.size());
     std::vector<PointCounts> counts(points.size());
     for (size_t g = 0; g < methods_.size(); ++g) {
       if (methods_[g].method == nullptr) continue;
       methods_[g].method->shade(points, radiance, counts, context);
+      const bool noisy = noise == Noise::all ||
+                         (noise == Noise::beside_lights && (level > 1 || methods_[g].method->chooses_at_each_point()));
+      if (noisy)
+        for (size_t i = 0; i < points.size(); ++i) residual_[points.pixel[i]] += radiance[i];
       for (size_t i = 0; i < points.size(); ++i) {
         const uint32_t p = points.pixel[i];
         light[g][p] += radiance[i];
@@ -291,7 +324,9 @@ class Batch {
   TracedPoints seen_;                    // by way of mirrors and glass
   std::vector<std::vector<Rgb>> light_;  // of each method: reflected, summed over a pixel's samples
   std::vector<float> illuminance_;       // summed over a pixel's samples
-  std::vector<Vec3f> counts_;            // clusters, rays, bounds
+  std::vector<Rgb> residual_;            // of what is in light_, summed over a pixel's samples
+  std::optional<FeatureTracer> features_;
+  std::vector<Vec3f> counts_;  // clusters, rays, bounds
 };
 
 }  // namespace

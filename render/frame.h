@@ -23,7 +23,8 @@ struct FrameOptions {
   };
   std::optional<CameraSamples> camera_samples;
   bool illuminance = false;  // fill that channel: about as long again
-  LUMICUT_FIELDS(FrameOptions, width, height, samples, tile_size, crop, seed, camera_samples, illuminance)
+  bool denoise = false;      // fill the channels of denoising
+  LUMICUT_FIELDS(FrameOptions, width, height, samples, tile_size, crop, seed, camera_samples, illuminance, denoise)
 };
 
 // Tiles of the crop in the order they are rendered.

@@ -3,15 +3,10 @@
 #include <cmath>
 
 #include "core/rng.h"
+#include "film/denoise.h"
 #include "film/iteration_mean.h"
 
 namespace lumicut {
-
-uint64_t film_pixel_bytes(size_t groups) {
-  uint64_t components = 3 * groups;
-  for (const ChannelInfo& c : channel_table()) components += c.components;
-  return components * sizeof(float);
-}
 
 Params params_of_iteration(const Params& params, uint32_t iteration, const Scene& scene) {
   if (iteration == 0) return params;
@@ -34,13 +29,19 @@ bool enough_iterations(const IterationOptions& options, uint32_t done, double se
   return options.target_error > 0.0 && done >= kLeastIterationsForError && error <= options.target_error;
 }
 
-uint64_t render_bytes(const Rect& crop, const IterationOptions& options, size_t groups) {
-  const uint64_t film = film_pixel_bytes(groups), state = film + IterationMean::kBytes;
+uint64_t render_bytes(const Rect& crop, const IterationOptions& options, size_t groups, bool denoise) {
+  const uint64_t film = film_pixel_bytes(groups, denoise), mean = IterationMean::pixel_bytes(denoise),
+                 state = film + mean;
   uint64_t bytes = film;
   // The iteration beside the mean; a list in which the image's error is looked up.
-  if (options.progressive()) bytes += film + IterationMean::kBytes + sizeof(double);
+  if (options.progressive()) bytes += film + mean + sizeof(double);
   // One is made, one is the last, one is what a host looks at. Or the one that the render goes on from.
   bytes += state * (options.checkpoints ? 3 : options.resume.empty() ? 0 : 1);
+  // At the end, when no checkpoint is being made and the last iteration's film is gone.
+  if (options.progressive() && denoise) {
+    const uint64_t free = film + sizeof(double) + (options.checkpoints ? state : 0), at_end = denoising_pixel_bytes();
+    bytes += at_end > free ? at_end - free : 0;
+  }
   return bytes * crop.width() * crop.height();
 }
 

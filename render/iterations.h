@@ -14,7 +14,7 @@ namespace lumicut {
 struct IterationOptions {
   uint32_t count = 1;  // 0: until stopped
   double max_seconds = 0.0, target_error = 0.0, confidence = 0.95;
-  bool checkpoints = false, groups = false;
+  bool checkpoints = false, groups = false, keep_fireflies = false;
   std::vector<uint8_t> resume;
   bool progressive() const { return count != 1 || checkpoints || !resume.empty(); }
 };
@@ -31,10 +31,8 @@ Params params_of_iteration(const Params& params, uint32_t iteration, const Scene
 bool enough_iterations(const IterationOptions& options, uint32_t done, double seconds, double last_seconds,
                        double error);
 
-// Bytes of a film for each pixel.
-uint64_t film_pixel_bytes(size_t groups);
 // Memory that a render takes at its peak, in bytes: films, what averages them, checkpoints. Not what grows with the scene
 // or the tile.
-uint64_t render_bytes(const Rect& crop, const IterationOptions& options, size_t groups);
+uint64_t render_bytes(const Rect& crop, const IterationOptions& options, size_t groups, bool denoise);
 
 }  // namespace lumicut

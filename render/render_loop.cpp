@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "film/denoise.h"
 #include "render/checkpoint.h"
 
 namespace lumicut {
@@ -15,7 +16,7 @@ RenderLoop::RenderLoop(Preparation& preparation, const Scene& scene, std::shared
       options_(options),
       iterations_(std::move(iterations)),
       progressive_(iterations_.progressive()),
-      film_(options.crop, std::move(groups)) {}
+      film_(options.crop, std::move(groups), options.denoise) {}
 
 RenderLoop::State RenderLoop::state() const {
   const std::lock_guard lock(state_mutex_);
@@ -82,7 +83,7 @@ void RenderLoop::render_iterations(Progress& progress, Stats& stats,
   using Clock = std::chrono::steady_clock;
   const Clock::time_point begin = Clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
-  IterationMean mean(options_.crop, iterations_.confidence);
+  IterationMean mean(options_.crop, iterations_.confidence, options_.denoise);
   const std::string key = checkpoint_key(scene_, preparation_.entry.id, preparation_.params,
                                          preparation_.host_lights.get(), options_, iterations_);
   uint32_t done = 0;
@@ -111,13 +112,21 @@ void RenderLoop::render_iterations(Progress& progress, Stats& stats,
     finish_iteration();
     for (const Rect& tile : frame_tiles(options_)) tile_done(tile);
   }
+  const auto denoise_film = [&] {
+    if (!options_.denoise) return;
+    const PhaseTimer timer(stats, "denoising");
+    progress.begin("denoising", 1);
+    const std::lock_guard lock(film_mutex_);
+    denoise({done, iterations_.confidence, iterations_.keep_fireflies}, mean.residuals(), progress, film_);
+  };
   const auto enough = [&] { return done > 0 && enough_iterations(iterations_, done, seconds(), last_seconds, error); };
   if (enough()) {
     // All was in the checkpoint. The integrator has the lights of the last iteration, as after any render.
     prepare(done - 1);
+    denoise_film();
     return;
   }
-  Film frame_film(options_.crop, film_.groups());
+  auto frame_film = std::make_unique<Film>(options_.crop, film_.groups(), options_.denoise);
   std::vector<OfGroup> of_groups;
   do {
     const double start = seconds();
@@ -127,11 +136,11 @@ void RenderLoop::render_iterations(Progress& progress, Stats& stats,
     frame.camera_samples = {preparation_.params.common().seed, uint64_t{done} * frame.samples};
     {
       const PhaseTimer timer(stats, "render");
-      render_frame(scene_, methods(prepared, of_groups, progress, stats), frame, frame_light(prepared), frame_film,
+      render_frame(scene_, methods(prepared, of_groups, progress, stats), frame, frame_light(prepared), *frame_film,
                    {progress, stats}, [&](const Rect& tile) {
                      {
                        const std::lock_guard lock(film_mutex_);
-                       mean.add(frame_film, tile, uint64_t{done} + 1, film_);
+                       mean.add(*frame_film, tile, uint64_t{done} + 1, film_);
                      }
                      tile_done(tile);
                    });
@@ -141,6 +150,8 @@ void RenderLoop::render_iterations(Progress& progress, Stats& stats,
     last_seconds = seconds() - start;
     finish_iteration();
   } while (!enough());
+  frame_film.reset();
+  denoise_film();
 }
 
 }  // namespace lumicut

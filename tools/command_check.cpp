@@ -24,7 +24,7 @@ struct Options : RenderSetup {
   Options() { integrator = kUsualIntegrator; }
   std::string scene, size, checkpoint;
   uint32_t samples = 0, passes = 1;
-  bool groups = false, json = false, no_forecast = false, quiet = false;
+  bool groups = false, denoise = false, json = false, no_forecast = false, quiet = false;
 };
 
 double bytes_of(const io::SceneData& data) {
@@ -61,10 +61,11 @@ void check_scene(const Options& o) {
   desc.samples = o.samples > 0 ? o.samples : data.samples;
   desc.passes = o.passes;
   if (o.groups) desc.flags |= LUMICUT_GROUPS;
+  if (o.denoise) desc.flags |= LUMICUT_DENOISE;
   if (!o.checkpoint.empty()) {
     desc.flags |= LUMICUT_CHECKPOINTS;
     check_room_for_checkpoint(api, o.checkpoint, uint64_t{desc.width} * desc.height,
-                              o.groups ? data.light_groups().size() : 0);
+                              o.groups ? data.light_groups().size() : 0, o.denoise);
   }
   bar.show("acceleration structure", 0, 0);
   commit_scene(api, watcher, scene.get(), o.scene);
@@ -117,6 +118,7 @@ void add_check(CLI::App& app) {
   command->add_option("--checkpoint", o->checkpoint,
                       "File that `render` will keep its passes in: is there room for it?");
   command->add_flag("--groups", o->groups, "One image for each light group too");
+  command->add_flag("--denoise", o->denoise, "Denoised too");
   command->add_flag("--no-forecast", o->no_forecast, "Render nothing: no forecast of time and memory");
   command->add_flag("--json", o->json, "Print JSON instead of text");
   command->add_flag("-q,--quiet", o->quiet, "No progress bar");

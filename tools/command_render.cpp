@@ -37,7 +37,7 @@ struct Options : RenderSetup {
   uint32_t samples = 0, squares = 0, passes = 0;
   double seconds = 0, target_error = 0, confidence = 0;
   int verbosity = 1;
-  bool quiet = false, half = false, resume = false, groups = false;
+  bool quiet = false, half = false, resume = false, groups = false, denoise = false, keep_fireflies = false;
   float exposure = 0;
 };
 
@@ -49,16 +49,21 @@ struct Channel {
 };
 
 // Channels to write: those asked for, or the usual ones.
-std::vector<Channel> choose_channels(const io::Api& api, const std::string& asked) {
+std::vector<Channel> choose_channels(const io::Api& api, const std::string& asked, bool denoise) {
   std::vector<Channel> known;
   std::string names;
   for (const auto& info : api::channels(api)) {
     known.push_back({info.name, static_cast<int>(info.components)});
     names += (names.empty() ? "" : ", ") + known.back().name;
   }
-  if (asked == "all") return known;
+  if (asked == "all") {
+    std::erase_if(known, [&](const Channel& c) { return !denoise && of_denoising(c.name); });
+    return known;
+  }
   std::vector<Channel> chosen;
-  std::stringstream words(asked.empty() ? "radiance,depth,normal,albedo,cut_size,rays,bounds" : asked);
+  const std::string usual = "radiance,depth,normal,albedo,cut_size,rays,bounds";
+  const std::string of_denoised = ",denoised,denoised_error,denoising_color,denoising_albedo,denoising_normal";
+  std::stringstream words(!asked.empty() ? asked : denoise ? usual + of_denoised : usual);
   for (std::string word; std::getline(words, word, ',');) {
     const auto at = std::find_if(known.begin(), known.end(), [&](const Channel& c) { return c.name == word; });
     if (at == known.end()) throw UsageError(fmt::format("--layers: no layer \"{}\"; there are {}", word, names));
@@ -98,7 +103,7 @@ class RenderCommand {
 
   void run() {
     check_outputs();
-    const auto channels = choose_channels(api(), o_.layers);
+    const auto channels = choose_channels(api(), o_.layers, o_.denoise);
     create_device();
     create_integrator();  // a wrong parameter shall not wait for big files
     read_scene();
@@ -180,8 +185,12 @@ class RenderCommand {
     desc_.confidence = static_cast<float>(o_.confidence);
     if (!o_.checkpoint.empty()) desc_.flags |= LUMICUT_CHECKPOINTS;
     if (o_.groups) desc_.flags |= LUMICUT_GROUPS;
-    for (const auto& channel : choose_channels(api(), o_.layers))
+    if (o_.denoise) desc_.flags |= LUMICUT_DENOISE;
+    for (const auto& channel : choose_channels(api(), o_.layers, o_.denoise)) {
       if (channel.name == "illuminance" && o_.layers != "all") desc_.flags |= LUMICUT_ILLUMINANCE;
+      if (of_denoising(channel.name)) desc_.flags |= LUMICUT_DENOISE;
+    }
+    if (o_.keep_fireflies) desc_.flags |= LUMICUT_KEEP_FIREFLIES;
     if (std::error_code code; o_.resume && std::filesystem::exists(o_.checkpoint, code)) {
       const NothingToLose reading;
       resumed_ = io::read_whole_file(o_.checkpoint);
@@ -193,7 +202,8 @@ class RenderCommand {
       throw UsageError(fmt::format("--crop {}: is not a part of {} x {} pixels", o_.crop, desc_.width, desc_.height));
     // What would fail after the first pass fails before it.
     if (!o_.checkpoint.empty())
-      check_room_for_checkpoint(api(), o_.checkpoint, pixel_count(), o_.groups ? data.light_groups().size() : 0);
+      check_room_for_checkpoint(api(), o_.checkpoint, pixel_count(), o_.groups ? data.light_groups().size() : 0,
+                                (desc_.flags & LUMICUT_DENOISE) != 0);
     read_seconds_ = now() - start;
     if (o_.verbosity >= 2) told_ = std::make_unique<io::SceneData>(std::move(data));
   }
@@ -419,7 +429,7 @@ class RenderCommand {
     stop_if_interrupted();
     if (!o_.output.empty()) io::write_exr(o_.output, image, o_.half);
     if (!o_.png.empty()) {
-      const auto radiance = read({"radiance", 3});
+      const auto radiance = read({o_.denoise ? "denoised" : "radiance", 3});
       write_exposed_png(o_.png, {radiance.pixels, width, height}, o_.exposure);
     }
     if (!o_.heat_maps.empty())
@@ -491,7 +501,8 @@ void add_render(CLI::App& app) {
   add_png_options(*command, o->png, o->exposure);
   command->add_option(
       "--layers", o->layers,
-      "Layers of the EXR, with commas, or `all` (default: radiance,depth,normal,albedo,cut_size,rays,bounds)");
+      "Layers of the EXR, with commas, or `all` (default: radiance,depth,normal,albedo,cut_size,rays,bounds, and what "
+      "--denoise gives)");
   command->add_flag("--half", o->half, "16 bits a number in the EXR instead of 32");
   command->add_option("--size", o->size, "WIDTHxHEIGHT in pixels (default: the scene's)");
   command->add_option("--spp", o->samples, "Samples a pixel (default: the scene's)")->check(CLI::Range(1, 65536));
@@ -522,6 +533,12 @@ void add_render(CLI::App& app) {
   command->add_flag(
       "--groups", o->groups,
       "One image for each light group too, as layers radiance.GROUP: `lumicut mix` puts them together anew");
+  command->add_flag(
+      "--denoise", o->denoise,
+      "Filter noise by what the passes tell of it: layers denoised, denoised_error and denoising_*; the PNG "
+      "is denoised. From two passes on");
+  command->add_flag("--keep-fireflies", o->keep_fireflies,
+                    "With --denoise: rare bright samples stay where they fell, instead of being spread");
   command->add_option("--heat-map", o->heat_maps,
                       "Folder for false-colour PNGs of what a point cost: bounds, cut_size, rays");
   command->add_option("--vpl-in", o->vpl_in, "Take the virtual lights from this file");

@@ -128,8 +128,10 @@ Forecast forecast(const io::Api& api, const RenderSetup& setup, lumicut_scene sc
   f.seconds = f.prepare_seconds + f.passes * render_cpu / threads + once.seconds;
   f.rays_per_pixel = f.passes * rays / f.probed_pixels;
   double components = 3 * f.groups;
-  for (const auto& channel : api::channels(api)) components += channel.components;
-  const double state = static_cast<double>(checkpoint_pixel_bytes(api, static_cast<size_t>(f.groups)));
+  const bool denoise = (desc.flags & LUMICUT_DENOISE) != 0;
+  for (const auto& channel : api::channels(api))
+    if (denoise || !of_denoising(channel.name)) components += channel.components;
+  const double state = static_cast<double>(checkpoint_pixel_bytes(api, static_cast<size_t>(f.groups), denoise));
   const double film = sizeof(float) * components, kept = (desc.flags & LUMICUT_CHECKPOINTS) != 0 ? state : 0.0;
   f.checkpoint_bytes = f.pixels * kept;
   // While it renders, what the library says of its films, means and checkpoints; then the film, the last checkpoint, the

@@ -124,15 +124,19 @@ std::vector<uint32_t> numbers(const std::string& text, char separator, size_t co
   return result;
 }
 
-uint64_t checkpoint_pixel_bytes(const io::Api& api, size_t groups) {
-  constexpr uint64_t kSums = 40;  // of the mean
+bool of_denoising(const std::string& channel) { return channel.starts_with("denois") || channel == "residual"; }
+
+uint64_t checkpoint_pixel_bytes(const io::Api& api, size_t groups, bool denoise) {
+  const uint64_t kSums = denoise ? 40 + 68 : 40;  // of the mean, and of what denoising knows of the noise
   uint64_t components = 3 * groups;
-  for (const auto& channel : api::channels(api)) components += channel.components;
+  for (const auto& channel : api::channels(api))
+    if (denoise || !of_denoising(channel.name)) components += channel.components;
   return kSums + sizeof(float) * components;
 }
 
-void check_room_for_checkpoint(const io::Api& api, const std::string& path, uint64_t pixels, size_t groups) try {
-  io::check_writable(path, pixels * checkpoint_pixel_bytes(api, groups));
+void check_room_for_checkpoint(const io::Api& api, const std::string& path, uint64_t pixels, size_t groups,
+                               bool denoise) try {
+  io::check_writable(path, pixels * checkpoint_pixel_bytes(api, groups, denoise));
 } catch (const io::FileError& error) {
   throw io::FileError(path, fmt::format("there is no place for a checkpoint: {}", error.what()));
 }

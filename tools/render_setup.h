@@ -68,10 +68,13 @@ std::vector<uint32_t> image_size(const std::string& text);
 std::vector<uint32_t> numbers(const std::string& text, char separator, size_t count, const char* option);
 
 // Of a checkpoint: the mean's sums, every channel, and the radiance of so many light groups.
-uint64_t checkpoint_pixel_bytes(const io::Api& api, size_t groups);
+uint64_t checkpoint_pixel_bytes(const io::Api& api, size_t groups, bool denoise);
 // Throws FileError where a checkpoint of so many pixels has no place: a folder that is not there, no permission, a full
 // disk.
-void check_room_for_checkpoint(const io::Api& api, const std::string& path, uint64_t pixels, size_t groups);
+void check_room_for_checkpoint(const io::Api& api, const std::string& path, uint64_t pixels, size_t groups,
+                               bool denoise);
+// Whether it is a channel that LUMICUT_DENOISE alone fills.
+bool of_denoising(const std::string& channel);
 
 // `count` squares of 32 pixels (less at the edges), spread evenly over the frame whatever their number; all of it when
 // there are no more. [Roberts 2018, R2 sequence]

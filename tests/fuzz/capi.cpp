@@ -509,7 +509,7 @@ class Session {
     const std::string checkpoint = rarely(8) ? in_.ConsumeRandomLengthString(100) : "";
     auto usual = box::frame(8, 6);
     usual.passes = in_.ConsumeIntegralInRange<uint32_t>(0, 2);
-    usual.flags = in_.ConsumeIntegralInRange<uint32_t>(0, 7);
+    usual.flags = in_.ConsumeIntegralInRange<uint32_t>(0, 31);
     uint32_t width = 0, height = 0;
     const auto* bytes = keep(std::vector<char>(checkpoint.begin(), checkpoint.end()));
     const auto* desc = descriptors(usual, 1, [&](lumicut_render_desc& d) {

@@ -227,12 +227,15 @@ lumicut_render_desc large_frame(uint32_t passes, uint32_t flags) {
 
 INSTANTIATE_TEST_SUITE_P(Of, PeakMemory,
                          testing::Values(large_frame(1, 0), large_frame(1, LUMICUT_GROUPS), large_frame(2, 0),
-                                         large_frame(2, LUMICUT_GROUPS), large_frame(3, LUMICUT_CHECKPOINTS),
+                                         large_frame(2, LUMICUT_GROUPS), large_frame(2, LUMICUT_DENOISE),
+                                         large_frame(3, LUMICUT_CHECKPOINTS),
+                                         large_frame(3, LUMICUT_CHECKPOINTS | LUMICUT_DENOISE),
                                          large_frame(3, LUMICUT_CHECKPOINTS | LUMICUT_GROUPS)),
                          [](const auto& of) {
                            const lumicut_render_desc& d = of.param;
                            return std::to_string(d.passes) + "passes" +
                                   ((d.flags & LUMICUT_CHECKPOINTS) != 0 ? "_checkpoints" : "") +
+                                  ((d.flags & LUMICUT_DENOISE) != 0 ? "_denoised" : "") +
                                   ((d.flags & LUMICUT_GROUPS) != 0 ? "_groups" : "");
                          });
 

@@ -172,6 +172,7 @@ std::vector<Change> render_changes() {
       {"render.tile_size", [](Host& h) { h.frame.tile_size = 8; }},
       {"render.confidence", [](Host& h) { h.frame.confidence = 0.9f; }},
       {"render.flags illuminance", [](Host& h) { h.frame.flags |= LUMICUT_ILLUMINANCE; }},
+      {"render.flags denoise", [](Host& h) { h.frame.flags |= LUMICUT_DENOISE; }},
       {"render.flags groups", [](Host& h) { h.frame.flags |= LUMICUT_GROUPS; }},
   };
 }

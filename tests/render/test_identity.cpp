@@ -85,10 +85,10 @@ TEST(Identity, EveryFieldOfAnEnvironmentCounts) { EXPECT_EQ(expect_every_field_c
 TEST(Identity, EveryFieldOfACameraCounts) { EXPECT_EQ(expect_every_field_counts(Camera{}), 22u); }
 TEST(Identity, EveryFieldOfAVirtualLightCounts) { EXPECT_EQ(expect_every_field_counts(Vpl{}), 20u); }
 TEST(Identity, EveryFieldOfAFrameCounts) {
-  EXPECT_EQ(expect_every_field_counts(FrameOptions{}), 11u);
+  EXPECT_EQ(expect_every_field_counts(FrameOptions{}), 12u);
   FrameOptions frame;
   frame.camera_samples = {0, 0};
-  EXPECT_EQ(expect_every_field_counts(frame), 12u);
+  EXPECT_EQ(expect_every_field_counts(frame), 13u);
 }
 TEST(Identity, EveryFieldOfAMeshCounts) {
   EXPECT_EQ(expect_every_field_counts(Mesh{}), 9u);

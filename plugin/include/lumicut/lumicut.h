@@ -250,13 +250,16 @@ typedef struct lumicut_render_desc {
   float target_error; /* stop after at least 8 passes, when lumicut_status.error is at most this; 0: never */
   float confidence;   /* of the interval in the channel `error`; 0: 0.95 */
   uint32_t flags;     /* LUMICUT_CHECKPOINTS: keep what lumicut_render_checkpoint shows; LUMICUT_ILLUMINANCE: fill that
-                         channel; LUMICUT_GROUPS: one image for each light group too, in channels "radiance.GROUP" */
+                         channel; LUMICUT_GROUPS: one image for each light group too, in channels "radiance.GROUP";
+                         LUMICUT_DENOISE: fill "denoised", "denoised_error" and what a host's own denoiser takes,
+                         "denoising_color", "denoising_albedo", "denoising_normal", at the end of at least two passes;
+                         with LUMICUT_KEEP_FIREFLIES rare bright samples stay where they fell. Other channels are as without */
   const void* checkpoint; /* go on from there: scene, integrator, parameters, the library's version and the fields above but
                              the stops must be the same, and so is the image, bit for bit. One that holds all that is asked
                              for, or more, gives the image that it holds. NULL: begin */
   uint64_t checkpoint_size;
 } lumicut_render_desc;
-enum { LUMICUT_CHECKPOINTS = 1, LUMICUT_ILLUMINANCE = 2, LUMICUT_GROUPS = 4 };
+enum { LUMICUT_CHECKPOINTS = 1, LUMICUT_ILLUMINANCE = 2, LUMICUT_GROUPS = 4, LUMICUT_DENOISE = 8, LUMICUT_KEEP_FIREFLIES = 16 };
 
 typedef struct lumicut_status {
   uint32_t struct_size;
