@@ -8,12 +8,17 @@
 #include <vector>
 
 #include "io/warnings.h"
-#include "lumicut/lumicut.h"
+#include "lumicut/lumicut_programs.h"
 
 namespace lumicut::io {
 
 // Of a coordinate or a length in the world, as the library has it: rays overflow single precision beyond.
 inline constexpr double kLargestCoordinate = 9e17;
+
+struct Program {
+  std::vector<lumicut_instruction> instructions;
+  std::vector<float> constants, table;
+};
 
 struct Texture {
   std::string file;
@@ -21,6 +26,13 @@ struct Texture {
   uint32_t flags = 0;                            // LUMICUT_SRGB ...
   std::vector<uint8_t> bytes;                    // of integer images, else
   std::vector<float> floats;                     // row 0 is the top
+  std::optional<Program> program;                // in an image's place; then there are no texels
+};
+
+// What programs ask of a mesh, as lumicut_attribute has it.
+struct Attribute {
+  uint32_t id = 0, components = 0, domain = 0;
+  std::vector<float> values;
 };
 
 struct Material {
@@ -36,6 +48,7 @@ struct Mesh {
   std::vector<float> transforms;    // twelve an instance; empty: one, as it is
   uint32_t group = 0;
   uint32_t mask = 0;  // as in lumicut_mesh
+  std::vector<Attribute> attributes;
 };
 
 // Intensity of a light by direction, as lumicut_profile has it.

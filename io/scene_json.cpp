@@ -13,6 +13,7 @@
 #include "io/ies_file.h"
 #include "io/json_reader.h"
 #include "io/path_variables.h"
+#include "io/program_json.h"
 #include "io/scene_obj.h"
 #include "io/sky.h"
 #include "io/texture_store.h"
@@ -78,6 +79,7 @@ class SceneReader {
     scale_ = root.number("unit_scale", 1.0, 1e-12, 1e12);
     if (auto image = root.find("image")) read_image(*image);
     read_camera(root.need("camera"));
+    if (auto programs = root.find("programs")) read_programs(*programs);
     if (auto materials = root.find("materials")) read_materials(*materials);
     // Small things first: a misspelt key shall not wait for big meshes.
     const auto meshes = root.find("meshes");
@@ -323,6 +325,11 @@ class SceneReader {
         out = 0;
       } else if (value->raw().is_object()) {
         JsonObject keys(*value);
+        if (const auto program = keys.find("program")) {
+          out = program_number(*program);
+          keys.finish();
+          return;
+        }
         const auto file = keys.need("file");
         uint32_t flags = 0;
         const auto flag = [&](const char* word, uint32_t bit) {
@@ -360,6 +367,51 @@ class SceneReader {
         given->fail("is of the model \"ggx\" alone");
     texture("roughness_texture", m.roughness_texture, TextureUse::numbers, true);
     texture("metallic_texture", m.metallic_texture, TextureUse::numbers, true);
+  }
+
+  // ---- Programs ----
+
+  uint32_t attribute_number(const std::string& name) {
+    return attributes_.emplace(name, static_cast<uint32_t>(attributes_.size())).first->second;
+  }
+
+  void read_programs(const JsonValue& value) {
+    for (const auto& element : value.elements()) {
+      JsonObject object(element);
+      const std::string name = object.need("name").text();
+      if (programs_.count(name)) object.need("name").fail(fmt::format("a program \"{}\" stands here already", name));
+      Texture texture;
+      texture.file = fmt::format("program \"{}\"", name);
+      texture.program = read_program(
+          object.need("steps"), [&](const std::string& attribute) { return attribute_number(attribute); },
+          [&](const JsonValue& image) { return program_image(image, name); });
+      object.finish();
+      scene_.textures.push_back(std::move(texture));
+      programs_[name] = static_cast<int32_t>(scene_.textures.size());
+    }
+  }
+
+  // An image that a program looks up: { "file", "use", "clamp", "nearest" }.
+  int32_t program_image(const JsonValue& value, const std::string& program) {
+    JsonObject keys(value);
+    const auto file = keys.need("file");
+    const TextureUse use = keys.has("use") && keys.need("use").choice({"color", "numbers"}) == 1 ? TextureUse::numbers
+                                                                                                 : TextureUse::colour;
+    uint32_t flags = 0;
+    if (keys.boolean("clamp", false)) flags |= LUMICUT_CLAMP;
+    if (keys.boolean("nearest", false)) flags |= LUMICUT_NEAREST;
+    keys.finish();
+    return textures_.get(resolve(file), use, flags, fmt::format("program \"{}\" ({})", program, path_));
+  }
+
+  int32_t program_number(const JsonValue& value) const {
+    const auto found = programs_.find(value.text());
+    if (found != programs_.end()) return found->second;
+    std::vector<std::string> names;
+    for (const auto& [known, index] : programs_) names.push_back(known);
+    const std::string near = nearest_word(value.text(), names);
+    value.fail(fmt::format("no program \"{}\" in \"programs\"{}", value.text(),
+                           near.empty() ? "" : "; did you mean \"" + near + "\"?"));
   }
 
   void read_materials(const JsonValue& value) {
@@ -404,6 +456,7 @@ class SceneReader {
       placed.push_back(base);
     }
     const uint32_t light_group = group(object), mask = ray_mask(object);
+    const auto attributes = object.find("attributes");
     const size_t first = scene_.meshes.size();
     if (object.has("obj")) {
       read_obj_mesh(object);
@@ -413,6 +466,13 @@ class SceneReader {
       value.fail("needs either \"obj\" (a file) or \"positions\" (with \"triangles\" or \"quads\")");
     }
     object.finish();
+    if (attributes) {
+      if (scene_.meshes.size() != first + 1) attributes->fail("needs a file of one object");
+      scene_.meshes[first].attributes = read_attributes(
+          *attributes, scene_.meshes[first], placed.size(),
+          [&](const std::string& attribute) { return attribute_number(attribute); },
+          [&](const JsonValue& file) { return resolve(file); });
+    }
     for (size_t i = first; i < scene_.meshes.size(); ++i) {
       Mesh& mesh = scene_.meshes[i];
       mesh.name = name.empty() ? value.path() : name;
@@ -823,6 +883,8 @@ class SceneReader {
   PathVariables variables_;
   SceneData scene_;
   TextureStore textures_;
+  std::map<std::string, int32_t> programs_;     // 1 + index into the textures
+  std::map<std::string, uint32_t> attributes_;  // numbers of names
   std::map<std::string, uint32_t> by_name_;
   std::vector<Mesh> visible_lights_;  // after all other meshes
   bool z_up_ = false;

@@ -31,9 +31,24 @@ std::string in_terms_of_file(std::string text, const SceneData& data) {
 
 void upload(const Api& api, lumicut_scene scene, const SceneData& data) {
   std::vector<lumicut_texture> textures;
+  std::vector<lumicut_program> programs;
+  programs.reserve(data.textures.size());
   for (const auto& texture : data.textures) {
     lumicut_texture t{};
     t.struct_size = sizeof(t);
+    if (texture.program) {
+      const Program& from = *texture.program;
+      lumicut_program p{};
+      p.struct_size = sizeof(p);
+      p.instruction_count = static_cast<uint32_t>(from.instructions.size());
+      p.constant_count = static_cast<uint32_t>(from.constants.size() / 3);
+      p.table_count = static_cast<uint32_t>(from.table.size());
+      p.instructions = from.instructions.data(), p.constants = from.constants.data(), p.table = from.table.data();
+      programs.push_back(p);
+      t.program = &programs.back();
+      textures.push_back(t);
+      continue;
+    }
     t.width = texture.width, t.height = texture.height, t.channels = texture.channels;
     t.format = texture.floats.empty() ? LUMICUT_UINT8 : LUMICUT_FLOAT32;
     t.flags = texture.flags;
@@ -60,6 +75,14 @@ void upload(const Api& api, lumicut_scene scene, const SceneData& data) {
     m.transform_count = mesh.transforms.size() / 12;
     m.group = mesh.group;
     m.mask = mesh.mask;
+    std::vector<lumicut_attribute> attributes;
+    for (const Attribute& from : mesh.attributes) {
+      lumicut_attribute a{};
+      a.struct_size = sizeof(a);
+      a.id = from.id, a.components = from.components, a.domain = from.domain, a.values = from.values.data();
+      attributes.push_back(a);
+    }
+    m.attributes = attributes.data(), m.attribute_count = attributes.size();
     uint32_t id = 0;
     check(api, api.scene_add_mesh(scene, &m, &id), fmt::format("mesh {}", mesh.name));
   }

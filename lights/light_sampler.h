@@ -114,6 +114,9 @@ class LightSampler {
   void add_lights(std::vector<double>& weights, const Progress* progress);
   double environment_power(const Progress* progress);
   void add_triangles(std::vector<double>& weights, const Progress* progress);
+  void add_programmed(uint32_t material, const Progress* progress);
+  // Luminance of what a triangle of an emissive material emits, in the mean over it.
+  double mean_emission(const Material& material, uint32_t mesh, uint32_t triangle, uint32_t instance) const;
   bool found_by_rays(const Emitter& e) const;
   Surface sample_surface(const Emitter& e, Rng& rng) const;
   // A sample of an emitter with extent as a virtual light that stands for `weight` of it; a sun's has no area_pdf: 0.

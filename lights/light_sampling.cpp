@@ -64,7 +64,8 @@ LightSampler::Surface LightSampler::sample_surface(const Emitter& e, Rng& rng) c
       area_pdf *= 0.5f;
     }
     Rgb radiance = scene_.emitted(surface, surface.geometric_normal);
-    if (material.cutout()) radiance *= scene_.opacity(e.index, e.triangle, hit.hit.u, hit.hit.v);  // as rays meet it
+    if (material.cutout())
+      radiance *= scene_.opacity(e.index, e.triangle, hit.hit.u, hit.hit.v, e.instance);  // as rays meet it
     return {surface.position, surface.geometric_normal, radiance, area_pdf, surface.offset};
   }
   const Light& l = scene_.lights()[e.index];

@@ -108,6 +108,7 @@ lumicut_result lumicut_scene_set_camera(lumicut_scene scene, const lumicut_camer
   return change_scene(scene, "lumicut_scene_set_camera", [&](lumicut_scene_t& s) {
     s.scene.set_camera(to_camera(read(camera)));
     s.camera_changed = true;
+    if (s.scene.asks_for_camera()) s.changed = true;  // surfaces look otherwise
   });
 }
 

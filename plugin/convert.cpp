@@ -7,6 +7,7 @@
 #include "accel/bvh_build.h"
 #include "core/parallel.h"
 #include "plugin/check.h"
+#include "plugin/convert_program.h"
 #include "plugin/descriptors.h"
 #include "plugin/profile_names.h"
 
@@ -57,6 +58,15 @@ Scene::Config to_accel(const char* owner, uint32_t robust, const char* kind, con
 
 Texture to_texture(const lumicut_texture& in, uint64_t index) {
   const FieldValidator c("lumicut_texture", index);
+  if (in.program != nullptr) {
+    const auto none = [&](const char* name, uint64_t value) {
+      if (value != 0) c.fail(name, number_text(value) + " is not 0, as `program` needs it");
+    };
+    none("width", in.width), none("height", in.height), none("channels", in.channels);
+    none("format", in.format), none("flags", in.flags);
+    if (in.pixels != nullptr) c.fail("pixels", "is not NULL, as `program` needs it");
+    return Texture(to_program(in.program, index));
+  }
   c.integer("width", in.width, 1, 65536);
   c.integer("height", in.height, 1, 65536);
   c.integer("channels", in.channels, 1, 4);
@@ -212,6 +222,7 @@ Mesh to_mesh(const lumicut_mesh& in) {
              static_cast<int64_t>(i));
   if (in.materials != nullptr && in.triangle_count > 0)
     mesh.triangle_materials.assign(in.materials, in.materials + in.triangle_count);
+  mesh.attributes = to_attributes(in);
   mesh.instances = to_transforms(in.transforms, in.transform_count, "lumicut_mesh");
   mesh.material = in.material;
   mesh.mask = in.mask == 0 ? 0xffffffffu : in.mask;

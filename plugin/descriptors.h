@@ -36,7 +36,8 @@ LUMICUT_DESCRIPTOR(lumicut_accel_info, F(struct_size), F(node_count), F(primitiv
                    F(expected_boxes), F(expected_primitives), F(expected_cost), F(lower), F(upper));
 LUMICUT_DESCRIPTOR(lumicut_accel_node_info, F(struct_size), F(left), F(right), F(first), F(count), F(lower), F(upper));
 LUMICUT_DESCRIPTOR(lumicut_scene_desc, F(struct_size), F(robust), F(accel), F(builder));
-LUMICUT_DESCRIPTOR(lumicut_texture, F(struct_size), F(width), F(height), F(channels), F(format), F(flags), F(pixels));
+LUMICUT_DESCRIPTOR(lumicut_texture, F(struct_size), F(width), F(height), F(channels), F(format), F(flags), F(pixels),
+                   F(program));
 LUMICUT_DESCRIPTOR(lumicut_material, F(struct_size), F(flags), F(diffuse), F(shininess), F(specular), F(opacity),
                    F(emission), F(diffuse_texture), F(specular_texture), F(opacity_texture), F(emission_texture),
                    F(roughness), F(metallic), F(ior), F(transmission), F(normal_texture), F(normal_strength),
@@ -44,7 +45,8 @@ LUMICUT_DESCRIPTOR(lumicut_material, F(struct_size), F(flags), F(diffuse), F(shi
                    F(coat), F(coat_roughness), F(coat_ior), F(translucency), F(translucency_texture), F(specular_tint),
                    F(absorption));
 LUMICUT_DESCRIPTOR(lumicut_mesh, F(struct_size), F(mask), F(positions), F(normals), F(uvs), F(vertex_count), F(indices),
-                   F(triangle_count), F(materials), F(transforms), F(transform_count), F(material), F(group));
+                   F(triangle_count), F(materials), F(transforms), F(transform_count), F(material), F(group),
+                   F(attributes), F(attribute_count));
 LUMICUT_DESCRIPTOR(lumicut_light, F(struct_size), F(type), F(unit), F(group), F(color), F(value), F(position),
                    F(radius), F(direction), F(angle), F(u), F(blend), F(v), F(spread), F(spot_cosine), F(profile),
                    F(tangent));

@@ -22,7 +22,7 @@ void Identity::add(const Params& params) {
 
 void Identity::add(const Scene& scene, bool camera) {
   scene.for_each_part([&](std::string_view name, const auto& part) {
-    if (camera || name != "camera") add_hash(name, hash_value(0, part));
+    if (camera || name != "camera" || scene.asks_for_camera()) add_hash(name, hash_value(0, part));
   });
 }
 

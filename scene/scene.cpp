@@ -28,6 +28,16 @@ float largest_term(const Transform& t, const Vec3f& p) {
 }
 
 constexpr float kInvPi = 0.31830988618f;
+// Over which the slope of a program's bumps is taken: a share of the distance, and of a hit's offset.
+constexpr float kBumpStep = 5e-4f, kLeastBumpStep = 50.0f;
+
+// A turned normal that does not lie below the surface itself.
+Vec3f above_surface(Vec3f n, const SurfaceHit& hit) {
+  constexpr float kLeast = 0.02f;
+  if (const float up = dot(n, hit.geometric_normal); up < kLeast)
+    n = normalize(n + hit.geometric_normal * (kLeast - up));
+  return n == Vec3f{} ? hit.normal : n;
+}
 
 std::string short_text(float v) {
   char text[32];
@@ -61,6 +71,17 @@ void check_mesh(const Mesh& mesh) {
   if (!mesh.triangle_materials.empty() && mesh.triangle_materials.size() != mesh.triangle_count())
     fail_argument("mesh has " + std::to_string(mesh.triangle_materials.size()) + " triangle materials for " +
                   std::to_string(mesh.triangle_count()) + " triangles");
+  for (size_t i = 0; i < mesh.attributes.size(); ++i) {
+    const MeshAttribute& a = mesh.attributes[i];
+    const size_t places = a.domain == AttributeDomain::vertex     ? n
+                          : a.domain == AttributeDomain::triangle ? mesh.triangle_count()
+                                                                  : std::max<size_t>(1, mesh.instances.size());
+    if (a.values.size() != a.components * places)
+      fail_argument(at("mesh attribute", i) + " has " + std::to_string(a.values.size()) + " values for " +
+                    std::to_string(places) + " places of " + std::to_string(a.components) + " components");
+    if (mesh.attribute(a.id) != &a)
+      fail_argument(at("mesh attribute", i) + " has the id " + std::to_string(a.id) + " of an earlier one");
+  }
   check_finite(mesh.positions, "mesh position");
   for (size_t i = 0; i < mesh.indices.size(); ++i)
     if (mesh.indices[i] >= n)
@@ -194,7 +215,10 @@ void Scene::check_references() const {
     if (index >= 0 && static_cast<size_t>(index) >= textures_.size())
       fail_argument(at("material", material) + "." + field + " = " + std::to_string(index) +
                     " is out of range: the scene has " + std::to_string(textures_.size()) + " textures");
-    if (index >= 0 && textures_[index].is_by_view() && !by_view)
+    if (index < 0) return;
+    if (const TextureProgram* program = textures_[index].program())
+      return program->check_textures(textures_, at("texture", static_cast<size_t>(index)) + ".program: ");
+    if (textures_[index].is_by_view() && !by_view)
       fail_argument(at("material", material) + "." + field + " = " + std::to_string(index) +
                     " is a texture by view, which this field cannot have");
   };
@@ -206,6 +230,13 @@ void Scene::check_references() const {
     check_texture(materials_[i].translucency_texture, i, "translucency_texture", true);
     check_texture(materials_[i].normal_texture, i, "normal_texture");
     check_texture(materials_[i].height_texture, i, "height_texture");
+    if (const int32_t heights = materials_[i].height_texture; heights >= 0 && textures_[heights].program() != nullptr)
+      fail_argument(at("material", i) + ".height_texture = " + std::to_string(heights) +
+                    " is a program; bumps of those belong into the program of normal_texture");
+    if (const int32_t normals = materials_[i].normal_texture;
+        normals >= 0 && textures_[normals].program() != nullptr && materials_[i].height_texture >= 0)
+      fail_argument(at("material", i) + ".height_texture = " + std::to_string(materials_[i].height_texture) +
+                    " stands beside a normal_texture that is a program");
     check_texture(materials_[i].roughness_texture, i, "roughness_texture", true);
     check_texture(materials_[i].metallic_texture, i, "metallic_texture", true);
   }
@@ -218,6 +249,9 @@ void Scene::check_references() const {
                   std::to_string(textures_.size()) + " textures");
   if (environment_.texture >= 0 && textures_[environment_.texture].is_by_view())
     fail_argument("environment.texture = " + std::to_string(environment_.texture) + " is a texture by view");
+  if (environment_.texture >= 0 && textures_[environment_.texture].program() != nullptr)
+    fail_argument("environment.texture = " + std::to_string(environment_.texture) +
+                  " is a program, which surfaces alone can have");
   for (size_t m = 0; m < meshes_.size(); ++m) {
     const auto check = [&](uint32_t material) {
       if (material >= materials_.size())
@@ -284,6 +318,11 @@ void Scene::commit(Progress& progress) {
   accel_ = std::move(accel);
   first_instance_ = std::move(first_instance), thickness_ = std::move(thickness);
   instanced_ = instanced;
+  has_programs_ =
+      std::any_of(textures_.begin(), textures_.end(), [](const Texture& t) { return t.program() != nullptr; });
+  asks_for_camera_ = std::any_of(textures_.begin(), textures_.end(), [](const Texture& t) {
+    return t.program() != nullptr && t.program()->asks_for_camera();
+  });
   bounds_ = bounds;
   radius_ = bounds.empty() || bounds.diagonal() == 0.0f ? 1.0f : 0.5f * bounds.diagonal();
   extent_ = std::move(extent);
@@ -312,7 +351,8 @@ bool Scene::passes(uint32_t mesh, uint32_t prim, float u, float v) const {
 bool Scene::passes_light(const LightHit& hit) const {
   const Mesh& mesh = meshes_[hit.mesh];
   const uint32_t id = mesh.material_of(hit.prim);
-  float stops = opacity(hit.mesh, hit.prim, hit.u, hit.v);
+  const uint32_t instance_index = hit.inst != kNoId ? hit.inst - first_instance_[hit.mesh] : 0;
+  float stops = opacity(hit.mesh, hit.prim, hit.u, hit.v, instance_index);
   if (stops > 0.0f && materials_[id].shadows_pass) {
     const uint32_t* t = &mesh.indices[3 * size_t{hit.prim}];
     const Vec3f& corner = mesh.positions[t[0]];
@@ -323,7 +363,13 @@ bool Scene::passes_light(const LightHit& hit) const {
     }
     const Vec3f normal = normalize(cross(edges[0], edges[1])), to_viewer = -normalize(dir);
     const SurfaceView view{{}, normal, normal, to_viewer, 0.0f};
-    const BsdfParameters glass = bsdf_parameters(id, uv_at(mesh, hit.prim, hit.u, hit.v), view);
+    std::optional<SurfaceHit> place;
+    if (has_programs_) place = place_on(hit.mesh, hit.prim, hit.u, hit.v, instance_index);
+    const BsdfParameters glass =
+        place ? bsdf_parameters(id, place->uv,
+                                {place->position, place->geometric_normal, place->normal, to_viewer, place->offset},
+                                &*place)
+              : bsdf_parameters(id, uv_at(mesh, hit.prim, hit.u, hit.v), view);
     const float cosine = std::abs(dot(normal, to_viewer));
     Rgb passed = straight_transmittance(glass, cosine);
     if (thickness_[hit.mesh] > 0.0f) {
@@ -338,11 +384,17 @@ bool Scene::passes_light(const LightHit& hit) const {
   return passes_by_chance(stops, hit.mesh, hit.prim, hit.u, hit.v);
 }
 
-float Scene::opacity(uint32_t mesh_id, uint32_t prim, float u, float v) const {
+float Scene::opacity(uint32_t mesh_id, uint32_t prim, float u, float v, uint32_t instance_index) const {
   const Mesh& mesh = meshes_[mesh_id];
   const Material& material = materials_[mesh.material_of(prim)];
   float opacity = material.opacity;
-  if (material.opacity_texture >= 0 && !mesh.uvs.empty()) {
+  if (material.opacity_texture < 0) return opacity;
+  if (const TextureProgram* program = textures_[material.opacity_texture].program()) {
+    const SurfaceHit place = place_on(mesh_id, prim, u, v, instance_index);
+    const SurfaceView view{place.position, place.geometric_normal, place.normal, place.geometric_normal, place.offset};
+    return opacity * std::clamp(programmed(*program, view, place.uv, &place).x, 0.0f, 1.0f);
+  }
+  if (!mesh.uvs.empty()) {
     const Vec2f at = uv_at(mesh, prim, u, v);
     opacity *= textures_[material.opacity_texture].mask(at.x, at.y);
   }
@@ -353,7 +405,14 @@ float Scene::offset_at(const Vec3f& position) const {
   return kOffset * std::max(2.0f * largest_coordinate(position), extent_.radius());
 }
 
-SurfaceHit Scene::surface(const RayHit& rh) const {
+SurfaceHit Scene::place_on(uint32_t mesh, uint32_t prim, float u, float v, uint32_t instance_index) const {
+  RayHit hit;
+  hit.hit.u = u, hit.hit.v = v, hit.hit.prim = prim, hit.hit.geom = mesh;
+  hit.hit.inst = hit_instance(mesh, instance_index);
+  return surface(hit, false);
+}
+
+SurfaceHit Scene::surface(const RayHit& rh, bool turn_normal) const {
   const Hit& hit = rh.hit;
   const Mesh& mesh = meshes_[hit.geom];
   const uint32_t* tri = &mesh.indices[3 * size_t{hit.prim}];
@@ -365,6 +424,8 @@ SurfaceHit Scene::surface(const RayHit& rh) const {
   SurfaceHit s;
   s.mesh = hit.geom;
   s.triangle = hit.prim;
+  s.instance = instance_of(hit);
+  s.u = hit.u, s.v = hit.v;
   s.material = mesh.material_of(hit.prim);
   s.t = rh.ray.tfar;
   s.position = p[0] * w + p[1] * hit.u + p[2] * hit.v;
@@ -390,10 +451,40 @@ SurfaceHit Scene::surface(const RayHit& rh) const {
   if (!mesh.uvs.empty()) {
     const Vec2f a = mesh.uvs[tri[0]], b = mesh.uvs[tri[1]], c = mesh.uvs[tri[2]];
     s.uv = {a.x * w + b.x * hit.u + c.x * hit.v, a.y * w + b.y * hit.u + c.y * hit.v};
-    if (const Material& material = materials_[s.material]; material.normal_texture >= 0 || material.height_texture >= 0)
+    if (const Material& material = materials_[s.material];
+        (material.normal_texture >= 0 && textures_[material.normal_texture].program() == nullptr) ||
+        material.height_texture >= 0)
       s.normal = mapped_normal(material, s, {p[1] - p[0], p[2] - p[0]}, {a, b, c});
   }
+  if (const int32_t turned = materials_[s.material].normal_texture; turned >= 0 && turn_normal)
+    if (const TextureProgram* program = textures_[turned].program())
+      s.normal = programmed_normal(*program, s, -rh.ray.dir);
   return s;
+}
+
+Vec3f Scene::programmed_normal(const TextureProgram& program, const SurfaceHit& hit, const Vec3f& to_viewer) const {
+  const SurfaceView view{hit.position, hit.geometric_normal, hit.normal, to_viewer, hit.offset};
+  const float side = dot(hit.geometric_normal, to_viewer) < 0.0f ? -1.0f : 1.0f;
+  return above_surface(programmed(program, view, hit.uv, &hit) * side, hit);
+}
+
+Rgb Scene::programmed(const TextureProgram& program, const SurfaceView& view, Vec2f uv, const SurfaceHit* hit) const {
+  ProgramPoint p;
+  p.behind = dot(view.geometric_normal, view.to_viewer) < 0.0f;
+  p.position = view.position;
+  p.normal = p.behind ? -view.normal : view.normal;
+  p.geometric_normal = p.behind ? -view.geometric_normal : view.geometric_normal;
+  p.to_viewer = view.to_viewer;
+  p.uv = uv;
+  p.camera = &camera_;
+  if (hit != nullptr) {
+    p.mesh = &meshes_[hit->mesh], p.triangle = hit->triangle, p.instance = hit->instance;
+    p.u = hit->u, p.v = hit->v;
+    if (instanced_) p.to_world = &instance(hit->mesh, hit->instance);
+    // About a pixel's width of a view of some thousand, and far above the precision of places.
+    p.step = std::max(kBumpStep * (std::isfinite(hit->t) ? hit->t : 0.0f), kLeastBumpStep * hit->offset);
+  }
+  return program.evaluate(p, textures_);
 }
 
 // Blinn's bumps: the height along the normal, by its slope over a texel. [Blinn 1978; as Blender has it: the distance
@@ -437,23 +528,21 @@ Vec3f Scene::mapped_normal(const Material& material, const SurfaceHit& hit, cons
     n = normalize(hit.normal + (bent - hit.normal) * material.normal_strength);
   }
   if (material.height_texture >= 0) n = bumped_normal(material, n, hit.uv, along_u, along_v);
-  // Not below the surface itself.
-  constexpr float kLeast = 0.02f;
-  if (const float up = dot(n, hit.geometric_normal); up < kLeast)
-    n = normalize(n + hit.geometric_normal * (kLeast - up));
-  return n == Vec3f{} ? hit.normal : n;
+  return above_surface(n, hit);
 }
 
 SurfaceInteraction Scene::interaction(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const {
   const SurfaceView view{hit.position, hit.geometric_normal, hit.normal, to_viewer, hit.offset, pixel};
-  return {hit, emitted(hit, to_viewer), bsdf_parameters(hit.material, hit.uv, view), view};
+  return {hit, emitted(hit, to_viewer), bsdf_parameters(hit.material, hit.uv, view, &hit), view};
 }
 
-BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv, const SurfaceView& view) const {
+BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv, const SurfaceView& view,
+                                      const SurfaceHit* hit) const {
   const Material& m = materials_[material];
   const auto share = [](float x) { return std::min(1.0f, std::max(0.0f, x)); };
   const auto color = [&](int32_t texture) {
     const Texture& t = textures_[texture];
+    if (const TextureProgram* program = t.program()) return programmed(*program, view, uv, hit);
     if (!t.is_by_view()) return t.color(uv.x, uv.y);
     return t.by_view(std::abs(dot(view.normal, view.to_viewer)), dot(view.geometric_normal, view.to_viewer) < 0.0f);
   };
@@ -488,7 +577,13 @@ bool Scene::may_be_specular() const {
 Rgb Scene::emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const {
   const Material& m = materials_[hit.material];
   if (!m.emissive() || (!m.emit_both_sides && dot(hit.geometric_normal, to_viewer) <= 0.0f)) return {};
-  return m.emission_texture < 0 ? m.emission : m.emission * textures_[m.emission_texture].color(hit.uv.x, hit.uv.y);
+  if (m.emission_texture < 0) return m.emission;
+  const Texture& texture = textures_[m.emission_texture];
+  if (const TextureProgram* program = texture.program()) {
+    const SurfaceView view{hit.position, hit.geometric_normal, hit.normal, to_viewer, hit.offset};
+    return m.emission * max(programmed(*program, view, hit.uv, &hit), Rgb{});
+  }
+  return m.emission * texture.color(hit.uv.x, hit.uv.y);
 }
 
 Vec2f Scene::environment_uv(const Vec3f& direction) const {

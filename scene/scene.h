@@ -14,30 +14,13 @@
 #include "scene/light.h"
 #include "scene/light_profile.h"
 #include "scene/material.h"
+#include "scene/mesh.h"
 #include "scene/ray_kind.h"
 #include "scene/scene_extent.h"
 #include "scene/surface_interaction.h"
 #include "scene/texture.h"
 
 namespace lumicut {
-
-struct Mesh {
-  std::vector<Vec3f> positions;
-  std::vector<Vec3f> normals;  // empty: flat
-  std::vector<Vec2f> uvs;      // empty: 0
-  std::vector<uint32_t> indices;
-  std::vector<uint32_t> triangle_materials;  // empty: `material` for all
-  std::vector<Transform> instances;          // empty: one, as it is
-  uint32_t material = 0;
-  uint32_t mask = 0xffffffffu;  // RayKind: of the rays that see it
-  uint32_t group = 0;
-  LUMICUT_FIELDS(Mesh, positions, normals, uvs, indices, triangle_materials, instances, material, mask, group)
-
-  size_t triangle_count() const { return indices.size() / 3; }
-  uint32_t material_of(uint32_t triangle) const {
-    return triangle_materials.empty() ? material : triangle_materials[triangle];
-  }
-};
 
 class Scene final : private HitFilter {
  public:
@@ -79,8 +62,8 @@ class Scene final : private HitFilter {
   template <typename Visit>
   void for_each_part(Visit&& visit) const {
     const auto& [config, textures, materials, glass, most_layers, meshes, lights, profiles, environment, camera,
-                 has_camera, trace, accel, first_instance, thickness, instanced, committed, version, bounds, radius,
-                 extent] = *this;
+                 has_camera, trace, accel, first_instance, thickness, instanced, has_programs, asks_for_camera,
+                 committed, version, bounds, radius, extent] = *this;
     const bool host_trace = trace != nullptr;
     visit("accel", config);
     visit("host_trace", host_trace);
@@ -123,8 +106,10 @@ class Scene final : private HitFilter {
     return instanced_ ? first_instance_[mesh] + index : kNoId;
   }
 
-  // Geometry of a hit of `accel()`. Normal maps turn its shading normal; a host's own points bring theirs.
-  SurfaceHit surface(const RayHit& hit) const;
+  // Geometry of a hit of `accel()`. Normal maps turn its shading normal, if they shall; a host's own points bring theirs.
+  SurfaceHit surface(const RayHit& hit, bool turn_normal = true) const;
+  // A place of a triangle as a hit without a ray, its normal not turned.
+  SurfaceHit place_on(uint32_t mesh, uint32_t triangle, float u, float v, uint32_t instance) const;
   // All of a hit, seen along its ray.
   SurfaceInteraction interaction(const RayHit& hit, uint32_t pixel = 0) const {
     return interaction(surface(hit), -hit.ray.dir, pixel);
@@ -134,8 +119,9 @@ class Scene final : private HitFilter {
   Bsdf bsdf(const SurfaceView& view, uint32_t material, Vec2f uv) const {
     return {bsdf_parameters(material, uv, view), view};
   }
-  // The material's description there, its textures looked up.
-  BsdfParameters bsdf_parameters(uint32_t material, Vec2f uv, const SurfaceView& view = {}) const;
+  // The material's description there, its textures looked up. Without `hit` programs know nothing of the mesh.
+  BsdfParameters bsdf_parameters(uint32_t material, Vec2f uv, const SurfaceView& view = {},
+                                 const SurfaceHit* hit = nullptr) const;
   // How many layers a point has at most, by the materials: rough clear coats and translucency add one each.
   size_t most_layers() const { return most_layers_; }
   // Whether any material may have a specular lobe.
@@ -143,7 +129,9 @@ class Scene final : private HitFilter {
   // Radiance emitted by a surface towards `to_viewer`.
   Rgb emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const;
   // Share of rays that a place of a triangle stops: factor times mask.
-  float opacity(uint32_t mesh, uint32_t prim, float u, float v) const;
+  float opacity(uint32_t mesh, uint32_t prim, float u, float v, uint32_t instance = 0) const;
+  // Whether what surfaces look like depends on the camera.
+  bool asks_for_camera() const { return asks_for_camera_; }
 
   // Radiance of the environment seen along `direction` (unit).
   Rgb environment_radiance(const Vec3f& direction) const;
@@ -155,6 +143,9 @@ class Scene final : private HitFilter {
   // `corners`: its uvs.
   Vec3f mapped_normal(const Material& material, const SurfaceHit& hit, const Vec3f (&edges)[2],
                       const Vec2f (&corners)[3]) const;
+  // By the normal texture, a program: the normal itself, in the world.
+  Vec3f programmed_normal(const TextureProgram& program, const SurfaceHit& hit, const Vec3f& to_viewer) const;
+  Rgb programmed(const TextureProgram& program, const SurfaceView& view, Vec2f uv, const SurfaceHit* hit) const;
   Vec3f bumped_normal(const Material& material, const Vec3f& normal, Vec2f uv, const Vec3f& along_u,
                       const Vec3f& along_v) const;
   bool passes(uint32_t mesh, uint32_t prim, float u, float v) const override;
@@ -177,6 +168,7 @@ class Scene final : private HitFilter {
   std::vector<uint32_t> first_instance_;  // of each mesh, in AccelGeometry::instances
   std::vector<float> thickness_;          // of each mesh whose glass absorbs what goes straight through it, else 0
   bool instanced_ = false;
+  bool has_programs_ = false, asks_for_camera_ = false;
   bool committed_ = false;
   uint64_t version_ = 0;
   Aabb bounds_;

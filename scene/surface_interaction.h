@@ -11,7 +11,8 @@ struct SurfaceHit {
   Vec3f geometric_normal;  // unit, the mesh's front side
   Vec3f normal;            // unit shading normal, on the geometric normal's side
   Vec2f uv;
-  uint32_t material = 0, mesh = 0, triangle = 0;
+  uint32_t material = 0, mesh = 0, triangle = 0, instance = 0;  // `instance`: of its mesh
+  float u = 0.0f, v = 0.0f;                                     // barycentric, as Hit has them
   float t = 0.0f;
   float offset = 0.0f;  // how far rays start from the surface: follows the size of its triangle and coordinates
 };

@@ -38,6 +38,13 @@ Texture::Texture(uint32_t width, uint32_t height, uint32_t channels, Format form
   }
 }
 
+Texture::Texture(TextureProgram program)
+    : width_(0),
+      height_(0),
+      channels_(0),
+      format_(Format::float32),
+      program_(std::make_shared<const TextureProgram>(std::move(program))) {}
+
 float Texture::value(uint32_t x, uint32_t y, uint32_t channel) const {
   const size_t i = (size_t{y} * width_ + x) * channels_ + channel;
   const bool alpha = has_alpha() && channel == channels_ - 1;

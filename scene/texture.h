@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "core/fields.h"
 #include "core/vec.h"
+#include "scene/texture_program.h"
 
 namespace lumicut {
 
@@ -24,6 +26,11 @@ class Texture {
   // `pixels`: height rows of width texels of `channels` (1..4) values, packed, row 0 on top (v = 1). Copied.
   // Throws Error naming the bad value.
   Texture(uint32_t width, uint32_t height, uint32_t channels, Format format, Options options, const void* pixels);
+  // A program in an image's place; nothing of what follows is for it.
+  explicit Texture(TextureProgram program);
+
+  // nullptr: an image.
+  const TextureProgram* program() const { return program_.get(); }
 
   // Linear colour at (u, v), v upwards; one channel is grey, two are grey and alpha. Never NaN.
   Rgb color(float u, float v) const;
@@ -55,7 +62,8 @@ class Texture {
   Options options_;
   std::vector<uint8_t> bytes_;
   std::vector<float> floats_;
-  LUMICUT_FIELDS(Texture, width_, height_, channels_, format_, options_, bytes_, floats_)
+  std::shared_ptr<const TextureProgram> program_;
+  LUMICUT_FIELDS(Texture, width_, height_, channels_, format_, options_, bytes_, floats_, program_)
 };
 
 }  // namespace lumicut

@@ -166,7 +166,8 @@ class Examiner {
 
   Preflight run() {
     p_.approximated = scene_.warnings.lines();
-    for (const auto& texture : scene_.textures) means_.push_back(texture_mean(texture, false));
+    for (const auto& texture : scene_.textures)  // a program's is not known
+      means_.push_back(texture.program ? Point{1, 1, 1} : texture_mean(texture, false));
     for (uint32_t m = 0; m < scene_.meshes.size(); ++m) shells_.push_back(find_shells(scene_, m));
     measure();
     count();

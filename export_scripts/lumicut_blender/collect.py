@@ -7,7 +7,7 @@ each set of materials; its instances are transforms.
 import bpy
 import numpy as np
 
-from . import library, lights, soft_spots, worlds
+from . import library, lights, mesh_attributes, soft_spots, worlds
 from .cameras import rows
 from .materials import Materials
 from .report import Report
@@ -102,19 +102,37 @@ class MeshReader:
             out.materials = numbers[slot_of_triangle]
         uvs = self._uvs(loops, corners, positions, tri_corners, slot_of_triangle, used)
         self.check()
+        attributes = self._attributes(loops, used)
+        self.check()
         bad = ~np.isfinite(positions).all(1)
         if bad.any():
             self.report.note(self.name, "Vertices that are not finite, moved to the origin")
             positions[bad] = 0
         self.check()
-        if uvs is None and kind != "corner":
+        if uvs is None and kind != "corner" and all(domain == "vertex" for _, domain, _ in attributes):
             out.indices = corners[tri_corners]
             out.normals = normals
+            out.attributes = [(number, library.OF_VERTICES, values) for number, _, values in attributes]
         else:  # a vertex for each corner of a face
             out.positions = positions[corners]
             out.uvs = uvs
             out.normals = normals[corners] if kind == "vertex" else normals
+            out.attributes = [(number, library.OF_VERTICES, values[corners] if domain == "vertex" else values)
+                              for number, domain, values in attributes]
         return out
+
+    def _attributes(self, loops, used):
+        """(number, "vertex" or "corner", values) of all that the programs of its materials ask for and that the mesh has."""
+        wanted = dict.fromkeys(name for slot in used for name in self.materials.converted[self.numbers[slot]].attributes())
+        reader = mesh_attributes.AttributeReader(self.mesh, fetch, lambda text: self.report.note(self.name, text), self.check)
+        found = []
+        for name in wanted:
+            if name[0] not in mesh_attributes.OF_INSTANCE:
+                self.check()
+                read = reader.read(name, self._layer, loops)
+                if read is not None:
+                    found.append((self.materials.attribute_number(name), *read))
+        return found
 
     def _slots(self, triangles):
         """Slot of each triangle; None: all the first."""
@@ -152,7 +170,7 @@ class MeshReader:
         wanted = {}
         for slot in used:
             converted = self.materials.converted[self.numbers[slot]]
-            if converted.pictures:
+            if converted.plain_pictures():
                 wanted.setdefault(converted.mapping, []).append(slot)
         if not wanted:
             return None
@@ -190,6 +208,8 @@ class Collector:
         self.depsgraph, self.check, self.cache, self.bake = depsgraph, check, cache, bake
         self.report = report if report is not None else Report()
         self.materials = Materials(self.report, max_shininess, images, check)
+        render = depsgraph.scene_eval.render
+        self.materials.aspect = (render.resolution_x * render.pixel_aspect_x) / max(1e-9, render.resolution_y * render.pixel_aspect_y)
         self.materials.images.frame = depsgraph.scene_eval.frame_current
         self.scene = SceneData()
         self.profiles = lights.Profiles(self.report)
@@ -312,12 +332,18 @@ class Collector:
         target = self._meshes[key]
         if target is not None:
             transform = rows(instance.matrix_world)
+            own = {self.materials.attribute_number(name): mesh_attributes.of_instance(name, instance)
+                   for name in dict.fromkeys(a for n in numbers for a in self.materials.converted[n].attributes())
+                   if name[0] in mesh_attributes.OF_INSTANCE}
             if is_flat(transform):
                 target = flattened(target, transform)
                 if target is not None:
+                    target.of_instances = {number: [values] for number, values in own.items()}
                     self._flat.append(target)
                     self.instances += 1
                 return
+            for number, values in own.items():
+                target.of_instances.setdefault(number, []).append(values)
             target.transforms.append(transform)
             self.instances += 1
 
@@ -347,7 +373,9 @@ class Collector:
         if self.cache is None:
             return self._convert(ob, mesh, numbers)
         # Evaluated data move in memory; the originals' names say what they came from.
-        mappings = tuple(self.materials.converted[n].mapping if self.materials.converted[n].pictures else None for n in numbers)
+        converted = [self.materials.converted[n] for n in numbers]
+        mappings = (tuple(c.mapping if c.plain_pictures() else None for c in converted),
+                    tuple((name, self.materials.attribute_number(name)) for c in converted for name in c.attributes()))
         names = frozenset({ob.name_full, mesh.name_full})
         key = (mesh.as_pointer(), mappings, names, tuple(numbers), len(mesh.vertices), len(mesh.loops))
         found = self.cache.meshes.get(key)
@@ -356,7 +384,8 @@ class Collector:
             if found is None:
                 return None
             self.cache.meshes[key] = found
-        return Mesh(found.name, found.positions, found.indices, found.normals, found.uvs, found.materials, found.material, [])
+        return Mesh(found.name, found.positions, found.indices, found.normals, found.uvs, found.materials, found.material, [],
+                    attributes=found.attributes)
 
     def _convert(self, ob, mesh, numbers):
         edited = mesh.is_editmode  # its faces are with the editor, the mesh is empty

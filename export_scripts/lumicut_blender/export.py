@@ -16,6 +16,7 @@ import zlib
 import numpy as np
 
 from . import library, properties
+from .scene_data import Program
 
 
 class ExportError(RuntimeError):
@@ -153,7 +154,41 @@ class Writer:
             self.files[key] = self.write(name, png(pixels) if as_png else exr(pixels))
         return self.files[key]
 
+    def program(self, number, p):
+        """The 1-based image's program, images among its instructions as files."""
+        steps = []
+        for row in p.instructions.tolist():
+            op, mode, inputs, data, count = row[0], row[1], row[2:10], row[10], row[11]
+            step = {"op": library.PROGRAM_OPS[op]}
+            if mode:
+                step["mode"] = mode
+            taken = library.PROGRAM_INPUTS[op]
+            if taken:
+                step["inputs"] = [i if i >= 0 else numbers(p.constants[-1 - i]) for i in inputs[:taken]]
+            if count:
+                step["table"] = numbers(p.table[data:data + count])
+            elif step["op"] in ("attribute", "normal_map", "transform"):
+                step["attribute"] = str(data)
+            elif step["op"] == "image":
+                image = self.data.images[data - 1]
+                use = "color" if image.pixels.dtype != np.uint8 or image.flags & library.SRGB else "numbers"
+                step["image"] = {"file": self.image(data, "colour" if use == "color" else "vectors"), "use": use,
+                                 **{key: True for key, bit in (("clamp", library.CLAMP), ("nearest", library.NEAREST)) if image.flags & bit}}
+            steps.append(step)
+        return {"name": f"program {number}", "steps": steps}
+
+    def attributes(self, mesh, file):
+        """Values in files of 32-bit floats beside the mesh."""
+        out = []
+        for number, domain, values in mesh.all_attributes():
+            name = self.write(f"{file}.{number}.f32", np.ascontiguousarray(values, "<f4").tobytes())
+            out.append({"name": str(number), "domain": ("vertices", "triangles", "instances")[domain],
+                        "components": values.shape[1], "file": name})
+        return {"attributes": out} if out else {}
+
     def texture(self, number, use):
+        if isinstance(self.data.images[number - 1], Program):
+            return {"program": f"program {number}"}
         name, flags = self.image(number, use), self.data.images[number - 1].flags
         options = {key: True for key, bit in (("clamp", library.CLAMP), ("nearest", library.NEAREST), ("by_view", library.BY_VIEW)) if flags & bit}
         return {"file": name, **options} if options else name
@@ -281,6 +316,9 @@ class Writer:
                "camera": self.camera(self.data.camera),
                "materials": [self.material(n, m) for n, (_, m) in zip(names, self.data.materials)],
                "lights": [self.light(light) for _, light in self.data.lights], "meshes": []}
+        programs = [self.program(1 + i, p) for i, p in enumerate(self.data.images) if isinstance(p, Program)]
+        if programs:
+            out["programs"] = programs
         if self.data.environment is not None:
             out["environment"] = self.environment(self.data.environment)
         for mesh in self.data.meshes:
@@ -290,6 +328,7 @@ class Writer:
             self.write(file, obj(mesh, mtl, names))
             out["meshes"].append({"name": mesh.name, "obj": file, "materials": {n: n for n in names},
                                   "instances": [numbers(t) for t in mesh.transforms],
+                                  **self.attributes(mesh, file),
                                   **({"group": mesh.group} if mesh.group else {}),
                                   **({"hidden_from": [ray for ray, bit in library.RAYS.items() if not mesh.mask & bit]} if mesh.mask else {})})
         if not out["meshes"]:
@@ -406,10 +445,17 @@ def write_scene(path, data, width, height, settings):
 
         for mesh in scene["meshes"]:
             mesh["obj"] = moved(mesh["obj"])
+            for attribute in mesh.get("attributes", ()):
+                attribute["file"] = moved(attribute["file"])
+        for program in scene.get("programs", ()):
+            for step in program["steps"]:
+                if "image" in step:
+                    step["image"]["file"] = moved(step["image"]["file"])
         for material in scene["materials"]:
             for key in [k for k in material if k.endswith("_texture")]:
                 t = material[key]
-                material[key] = moved(t) if isinstance(t, str) else {**t, "file": moved(t["file"])}
+                if "program" not in t:
+                    material[key] = moved(t) if isinstance(t, str) else {**t, "file": moved(t["file"])}
         for light in scene["lights"]:
             if "ies" in light:
                 light["ies"] = moved(light["ies"])

@@ -33,6 +33,12 @@ CHECKPOINTS, ILLUMINANCE, GROUPS = 1, 2, 4  # of RenderDesc.flags
 VIRTUAL_LIGHTS, LIGHT_GROUPS, COMPENSATION, SAVED_STATE, VIEW_INDEPENDENT, ALL_LIGHTS = 1, 2, 4, 8, 16, 32  # traits
 VPL_OMNI, VPL_ORIENTED, VPL_DIRECTIONAL, VPL_SPOT, VPL_SPHERE = range(5)
 FOREVER = NO_ID = 0xFFFFFFFF
+# Operations of texture programs, LUMICUT_OP_..., from 0 on; and the domains of attributes.
+PROGRAM_OPS = ("uv attribute position normal to_viewer behind camera transform math vector grey separate combine clamp map_range "
+               "mapping rotate mix color ramp curves fresnel bump normal_map noise musgrave voronoi wave magic brick checker "
+               "gradient white_noise project image").split()
+PROGRAM_INPUTS = (0, 0, 0, 0, 0, 0, 0, 1, 3, 3, 1, 1, 3, 3, 6, 4, 4, 3, 4, 1, 2, 2, 4, 2, 8, 7, 5, 6, 2, 6, 1, 1, 2, 1, 3)
+OF_VERTICES, OF_TRIANGLES, OF_INSTANCES = range(3)
 
 
 class Error(RuntimeError):
@@ -132,7 +138,17 @@ class SceneDesc(Descriptor):
 
 class Texture(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("width", c_uint32), ("height", c_uint32), ("channels", c_uint32),
-                ("format", c_uint32), ("flags", c_uint32), ("pixels", c_void_p)]
+                ("format", c_uint32), ("flags", c_uint32), ("pixels", c_void_p), ("program", c_void_p)]
+
+
+class Program(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("instruction_count", c_uint32), ("constant_count", c_uint32),
+                ("table_count", c_uint32), ("instructions", c_void_p), ("constants", c_void_p), ("table", c_void_p)]
+
+
+class Attribute(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("id", c_uint32), ("components", c_uint32), ("domain", c_uint32),
+                ("values", c_void_p)]
 
 
 class Material(Descriptor):
@@ -152,7 +168,7 @@ class Mesh(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("mask", c_uint32), ("positions", c_void_p), ("normals", c_void_p),
                 ("uvs", c_void_p), ("vertex_count", c_uint64), ("indices", c_void_p), ("triangle_count", c_uint64),
                 ("materials", c_void_p), ("transforms", c_void_p), ("transform_count", c_uint64),
-                ("material", c_uint32), ("group", c_uint32)]
+                ("material", c_uint32), ("group", c_uint32), ("attributes", c_void_p), ("attribute_count", c_uint64)]
 
 
 class Light(Descriptor):
@@ -210,7 +226,7 @@ class ChannelInfo(Descriptor):
 
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
 SIZES = {Ray: 48, Hit: 32, Rayhit: 80, Vpl: 64, Point: 64, DeviceDesc: 32, Status: 64, AccelDesc: 80, AccelInfo: 80,
-         AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 32, Material: 164, Mesh: 88, Light: 116, Profile: 40,
+         AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 40, Material: 164, Mesh: 104, Light: 116, Profile: 40,
          Environment: 64, Camera: 92, IntegratorInfo: 88, ParamInfo: 72, RenderDesc: 72, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32
@@ -440,9 +456,19 @@ class Scene(Handle):
             robust=ROBUST if robust else FAST, accel=accel.encode(), builder=builder.encode() if builder else None)))
 
     def set_textures(self, textures):
-        """(pixels, flags) each: pixels (h, w, channels) of uint8 or float32, top row first."""
-        items = []
-        for pixels, flags in textures:
+        """(pixels, flags) each: pixels (h, w, channels) of uint8 or float32, top row first. Or a program: (instructions
+        (n, 12) of int32, constants (k, 3) and table of float32)."""
+        items, kept = [], []
+        for texture in textures:
+            if len(texture) == 3:
+                instructions, constants, table = kept_arrays = (_rows(texture[0], np.int32, 12), _rows(texture[1], np.float32, 3),
+                                                                _rows(texture[2], np.float32, 1))
+                program = Program(instruction_count=len(instructions), constant_count=len(constants), table_count=len(table),
+                                  instructions=instructions.ctypes.data, constants=constants.ctypes.data, table=table.ctypes.data)
+                kept.append((program, kept_arrays))
+                items.append(Texture(program=ctypes.addressof(program)))
+                continue
+            pixels, flags = texture
             height, width, channels = pixels.shape
             assert pixels.flags.c_contiguous and pixels.dtype in (np.uint8, np.float32)
             items.append(Texture(width=width, height=height, channels=channels, flags=flags, pixels=pixels.ctypes.data,
@@ -466,7 +492,9 @@ class Scene(Handle):
                 raise Error(INVALID_ARGUMENT, f"profile: {w.size} values for {v.size} x {h.size} angles")
         self._call("scene_set_profiles", *_array(Profile, items))
 
-    def add_mesh(self, positions, indices, normals=None, uvs=None, materials=None, material=0, transforms=None, group=0, mask=0):
+    def add_mesh(self, positions, indices, normals=None, uvs=None, materials=None, material=0, transforms=None, group=0, mask=0,
+                 attributes=()):
+        """`attributes`: (id, domain, values) each, a row of `values` for each place."""
         positions, normals, uvs = _rows(positions, np.float32, 3), _rows(normals, np.float32, 3), _rows(uvs, np.float32, 2)
         indices, materials = _rows(indices, np.uint32, 3), _rows(materials, np.uint32, 1)
         transforms = _rows(transforms, np.float32, 12)
@@ -479,10 +507,20 @@ class Scene(Handle):
         def address(a):
             return None if a is None else a.ctypes.data
 
+        counts = {OF_VERTICES: len(positions), OF_TRIANGLES: len(indices), OF_INSTANCES: 1 if transforms is None else len(transforms)}
+        arrays = []
+        for number, domain, values in attributes:
+            values = np.ascontiguousarray(values, np.float32)
+            if values.ndim != 2 or len(values) != counts[domain]:
+                raise Error(INVALID_ARGUMENT, f"attribute {number}: {values.shape} values for {counts[domain]} places")
+            arrays.append((number, domain, values))
+        described = (Attribute * len(arrays))(*(Attribute(id=number, components=values.shape[1], domain=domain, values=values.ctypes.data)
+                                                for number, domain, values in arrays))
         mesh = Mesh(positions=address(positions), normals=address(normals), uvs=address(uvs),
                     vertex_count=len(positions), indices=address(indices), triangle_count=len(indices),
                     materials=address(materials), material=material, transforms=address(transforms),
-                    transform_count=0 if transforms is None else len(transforms), group=group, mask=mask)
+                    transform_count=0 if transforms is None else len(transforms), group=group, mask=mask,
+                    attributes=ctypes.addressof(described) if arrays else None, attribute_count=len(arrays))
         self._call("scene_add_mesh", ctypes.byref(mesh), ctypes.byref(c_uint32()))
 
     def set_environment(self, environment):

@@ -14,6 +14,7 @@ from . import library, volumes
 from .images import Images, Picture, image_of
 from .mappings import Mapping, aligned
 from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Value, input_of
+from .programs import NORMAL, CannotCompile, Compiler, ProgramPicture, of_picture
 
 HOLE = 1e-3  # an opacity that the library takes as "not there"; 0 means 1 to it
 LARGEST_FACTOR = 1e6  # of a texture, in the library
@@ -110,7 +111,7 @@ class Surface:
 
 def cut_of(factor, picture):
     """The share of a colour, of a picture's in the mean, that lies above 1."""
-    if not (factor > 1).any() and (picture is None or picture.is_byte()):
+    if not (factor > 1).any() and (picture is None or picture.is_byte()) or isinstance(picture, ProgramPicture):
         return 0.0
     colours = factor if picture is None else factor * picture.linear()
     return float(np.maximum(colours - 1, 0).mean() / max(colours.mean(), 1e-9))
@@ -124,15 +125,22 @@ class SurfaceReader(Evaluator):
     """Closures of one material's tree, added up."""
 
     all_rays = True
+    programs = True
+    material_index = 0
+    base_normal = NORMAL  # of sockets that nothing feeds
     normals = None  # (picture, strength)
     heights = None  # (picture, distance, strength)
+
+    def __init__(self, *words):
+        super().__init__(*words)
+        self.compiler = Compiler(self)
 
     def surface(self, socket, stack=()):
         node, output, stack = self.source(socket, stack)
         if node is None:
             return Surface()
         if output.type != "SHADER":  # a colour where a shader should be: Cycles lets it shine
-            return Surface(emission=self.node_value(node, output, stack))
+            return Surface(emission=self.value(socket, stack))
         handler = getattr(self, "closure_" + node.type.lower(), None)
         if handler is None:
             self.note(node.bl_label or node.type, "Shaders left out")
@@ -220,16 +228,23 @@ class SurfaceReader(Evaluator):
         """What turns the node's normal: a normal map, a bump map, or a bump map above a normal map."""
         socket = node.inputs.get("Normal")
         if socket is None or not socket.is_linked:
-            return
+            return self.programmed_normal(self.base_normal, "")
+        given = socket, stack
         source, _, stack = self.source(socket, stack)
         if source is None:
             return
+        if self.base_normal is not NORMAL:
+            return self.programmed_normal(*given)
         if source.type == "BUMP":
             self.bumps(source, stack)
             socket = source.inputs["Height"]
             if not socket.is_linked:
                 return
             height = self.grey(self.value(socket, stack))
+            plain = not any(source.inputs[name].is_linked for name in ("Distance", "Strength"))
+            if isinstance(height.picture, ProgramPicture) or not plain or self.normals is not None and isinstance(self.normals[0], ProgramPicture):
+                self.normals = None
+                return self.programmed_normal(*given)
             if height.picture is not None and not height.picture.is_by_view():
                 distance = self.number(source.inputs["Distance"], stack, "bump distance") * float(height.factor[0])
                 strength = self.number(source.inputs["Strength"], stack, "bump strength")
@@ -244,13 +259,29 @@ class SurfaceReader(Evaluator):
         if source.type == "NORMAL_MAP" and source.space == "TANGENT":
             colour = self.value(source.inputs["Color"], stack)
             strength = self.number(source.inputs["Strength"], stack, "normal strength")
-            if colour.picture is not None and not colour.picture.is_by_view() and (colour.factor == 1).all():
+            if colour.picture is not None and not colour.picture.is_by_view() and (colour.factor == 1).all() and \
+                    not isinstance(colour.picture, ProgramPicture) and not source.inputs["Strength"].is_linked:
                 if strength > 0 and self.normals is None:
                     self.normals = colour.picture, min(10.0, strength)
                 elif strength > 0 and self.normals[0].key != colour.picture.key:
                     self.note(colour.picture.name, "Several normal maps in one material, the first taken")
                 return
-        self.note(source.bl_label, "Normal and bump maps left out")
+        self.programmed_normal(*given)
+
+    def programmed_normal(self, socket, stack):
+        """A program that gives the normal; `socket`: or an expression."""
+        try:
+            expr = self.compiler.socket(socket, stack) if hasattr(socket, "is_linked") else socket
+        except CannotCompile as what:
+            self.note(str(what), "Normal and bump maps left out")
+            return
+        if expr is NORMAL or expr.constant():
+            return
+        found = ProgramPicture(self.owner, expr)
+        if self.normals is None and self.heights is None:
+            self.normals = found, 1.0
+        elif self.normals is None or self.normals[0].key != found.key:
+            self.note(found.name, "Several normals in one material, the first taken")
 
     def rough(self, node, stack):
         """Roughness, as one number and, where there is one, as the picture that it is the mean of."""
@@ -442,6 +473,13 @@ class Converted:
     mapping: Mapping
     by_ray: bool = False  # other kinds of rays may see another
 
+    def plain_pictures(self):
+        return {slot: p for slot, p in self.pictures.items() if not isinstance(p, ProgramPicture)}
+
+    def attributes(self):
+        """What its programs ask of meshes, each once."""
+        return list(dict.fromkeys(a for p in self.pictures.values() if isinstance(p, ProgramPicture) for a in p.attributes()))
+
     def is_hole(self):
         """Whether no ray meets it."""
         return self.values.opacity < 2 * HOLE and "opacity" not in self.pictures and not any(self.values.emission)
@@ -462,6 +500,8 @@ class Materials:
         self.report, self.max_shininess = report, max_shininess
         self.images = images or Images(report, check)
         self.converted, self.pictures = [], []
+        self.aspect = 1.0
+        self._attributes = {}
         self._numbers, self._picture_numbers = {}, {}
 
     def held_out(self, number):
@@ -518,11 +558,19 @@ class Materials:
             self._picture_numbers[picture.key] = len(self.pictures)
         return self._picture_numbers[picture.key]
 
+    def attribute_number(self, name):
+        """Of what programs ask of meshes: a tuple that names it."""
+        return self._attributes.setdefault(name, len(self._attributes))
+
     def items(self):
         return [(c.name, c.values) for c in self.converted]
 
     def image_items(self):
-        return [image_of(picture) for picture in self.pictures]
+        items = []
+        for picture in self.pictures:  # which grows by the images of programs
+            items.append(picture.compiled(self.picture_number, self.attribute_number) if isinstance(picture, ProgramPicture)
+                         else image_of(picture))
+        return items
 
     def _convert(self, material, ray):
         name = "default" if material is None else material.name
@@ -563,15 +611,22 @@ class Materials:
         if heights is not None:
             pictures["height"], m.bump_distance, m.bump_strength = heights
         every = [slot for slot in (*SLOTS, "roughness", "metallic", "normal", "height")
-                 if slot in pictures and not pictures[slot].is_by_view()]
+                 if slot in pictures and not pictures[slot].is_by_view() and not isinstance(pictures[slot], ProgramPicture)]
         together = aligned([pictures[slot] for slot in every], lambda p: self.report.note(f"{name} ({p})", COARSE))
         if together is None:
-            self.report.note(name, "Textures of one material on several coordinates, all laid on the first's")
+            # Each looked up by a program of its own, but for those of the first mapping; normals and heights stay.
+            first = next((pictures[slot] for slot in ("normal", "height") if slot in every), pictures[every[0]])
+            apart = [slot for slot in every if pictures[slot].mapping != first.mapping]
+            for slot in set(apart) & {"normal", "height"}:
+                self.report.note(name, "Textures of one material on several coordinates, all laid on the first's")
+            for slot in set(apart) - {"normal", "height"}:
+                pictures[slot] = ProgramPicture(name, of_picture(pictures[slot]))
+            every = [slot for slot in every if pictures[slot].mapping == first.mapping and not isinstance(pictures[slot], ProgramPicture)]
         else:
             pictures.update(zip(every, together))
         mapping = pictures[every[0]].mapping if every else Mapping()
         for slot, picture in pictures.items():
-            if slot == "opacity":
+            if slot == "opacity" and not isinstance(picture, ProgramPicture):
                 picture = self._mask(picture)
             setattr(m, slot + "_texture", self.picture_number(picture))
         return Converted(name, m, pictures, mapping, surface.by_ray)
@@ -602,8 +657,8 @@ class Materials:
         pictured = {}
         if surface.rough_picture is not None:
             value = surface.rough_picture
-            texels = value.texels()
-            if ((MIRROR <= texels) & (texels < least)).any():
+            texels = None if isinstance(value.picture, ProgramPicture) else value.texels()
+            if texels is None or ((MIRROR <= texels) & (texels < least)).any():
                 self._raised(MIRROR, name)
                 value = evaluator.apply("gloss limit", lambda r: np.where((MIRROR <= r) & (r < least), least, r), value)
             pictured["roughness"] = value
@@ -669,19 +724,31 @@ class Materials:
         grey = (picture.linear() @ LUMINANCE)[..., None]
         return Picture(picture.name + " mask", (picture.key, "mask"), picture.mapping, picture.flags, linear=grey)
 
+    @staticmethod
+    def _displace(reader, material, socket):
+        """Displacement as a bump beneath the material's own normals."""
+        try:
+            reader.base_normal = reader.compiler.displacement(socket) or NORMAL
+        except CannotCompile as what:
+            reader.note(str(what), "Displacement left out")
+            return
+        settings = getattr(material, "cycles", material)
+        if getattr(settings, "displacement_method", "BUMP") != "BUMP" and reader.base_normal is not NORMAL:
+            reader.note("", "Displacement taken as a bump map")
+
     def _surface(self, material, name, ray):
         if material is None:
             return Surface(diffuse=Value(0.8)), None, None
         if not material.use_nodes or material.node_tree is None:
             return Surface(diffuse=Value(list(material.diffuse_color)[:3])), None, None
         reader = SurfaceReader(name, self.images, self.report)
-        reader.ray = ray
+        reader.ray, reader.aspect, reader.material_index = ray, self.aspect, material.pass_index
         tree = material.node_tree
         output = tree.get_output_node("CYCLES") or tree.get_output_node("ALL")
         if output is None:
             return Surface(), None, None
         if output.inputs["Displacement"].is_linked:
-            reader.note("", "Displacement left out")
+            self._displace(reader, material, output.inputs["Displacement"])
         # Outputs inside a group cannot be: the output stands in the tree itself.
         surface = reader.surface(output.inputs["Surface"])
         if output.inputs["Volume"].is_linked:

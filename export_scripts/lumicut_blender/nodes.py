@@ -10,6 +10,8 @@ import numpy as np
 from . import library
 from .images import Picture
 from .mappings import Mapping, aligned, sized
+from .programs import CannotCompile, NeedsProgram, ProgramPicture
+from . import programs
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
@@ -138,6 +140,19 @@ def blackbody(kelvin):
                                    0.0556434 * big_x - 0.2040259 + 1.0572252 * big_z]))
 
 
+def wavelength(nanometres):
+    """Linear Rec.709 of monochromatic light: the CIE 1931 observer by Wyman et al. 2013, a few per cent from Blender's."""
+    def lobe(mean, below, above):
+        d = (nanometres - mean) * (below if nanometres < mean else above)
+        return math.exp(-0.5 * d * d)
+
+    x = 0.362 * lobe(442.0, 0.0624, 0.0374) + 1.056 * lobe(599.8, 0.0264, 0.0323) - 0.065 * lobe(501.1, 0.0490, 0.0382)
+    y = 0.821 * lobe(568.8, 0.0213, 0.0247) + 0.286 * lobe(530.9, 0.0613, 0.0322)
+    z = 1.217 * lobe(437.0, 0.0845, 0.0278) + 0.681 * lobe(459.0, 0.0385, 0.0725)
+    rgb = np.array([[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]) @ (x, y, z)
+    return np.maximum(0, rgb / 2.52)
+
+
 # Outputs of Light Path that are 1. Depths are those of the first ray of a kind.
 LIGHT_PATH = {
     "camera": {"Is Camera Ray"},
@@ -155,12 +170,18 @@ class Evaluator:
     ray = "camera"      # the kind of ray, of library.RAYS, that Light Path tells
     by_ray = False      # whether it was asked
     all_rays = False    # whether the owner asks for all kinds
+    programs = False    # whether what is neither a constant nor an image may become a program
+    aspect = 1.0        # of the picture, for Window coordinates
+    _pending = None     # notes of an attempt to do without a program
 
     def __init__(self, owner, images, report):
         self.owner, self.images, self.report = owner, images, report
 
     def note(self, what, text):
-        self.report.note(f"{self.owner} ({what})" if what else self.owner, text)
+        if self._pending is not None:
+            self._pending.append((what, text))
+        else:
+            self.report.note(f"{self.owner} ({what})" if what else self.owner, text)
 
     # ---- Links --------------------------------------------------------------------------------------------------
 
@@ -201,6 +222,46 @@ class Evaluator:
     def value(self, socket, stack=()):
         if socket is None:
             return ZERO
+        if not self.programs or self._pending is not None:
+            return self._plain_value(socket, stack)
+        self._pending = []
+        try:
+            value = self._plain_value(socket, stack)
+        except NeedsProgram:
+            value = None
+        finally:
+            notes, self._pending = self._pending, None
+        if value is None:
+            return self.programmed(socket, stack)
+        for note in notes:
+            self.note(*note)
+        return value
+
+    def programmed(self, socket, stack):
+        """A program; where there is none, as if there were no programs."""
+        try:
+            expr = self.compiler.socket(socket, stack)
+        except CannotCompile as what:
+            self.note(str(what), "Nodes taken as a constant colour")
+            self.programs = False
+            try:
+                self.report, before = Quiet(), self.report
+                try:
+                    return self._plain_value(socket, stack)
+                finally:
+                    self.report = before
+            finally:
+                self.programs = True
+        if expr.constant():
+            return Value(expr.mean)
+        return Value(1, ProgramPicture(self.owner, expr))
+
+    def plain_or_program(self):
+        """Called where an approximation follows: leaves it to a program where there may be one."""
+        if self._pending is not None:
+            raise NeedsProgram
+
+    def _plain_value(self, socket, stack):
         node, output, stack = self.source(socket, stack)
         if node is None:
             return self.constant(output)
@@ -221,6 +282,7 @@ class Evaluator:
         """A value that must be one number: the mean of a picture, with a note."""
         v = self.value(socket, stack)
         if v.picture is not None:
+            self.plain_or_program()
             self.note(what, "Textures taken as their mean")
         return v.scalar()
 
@@ -231,6 +293,8 @@ class Evaluator:
         pictures = [v.picture for v in values if v.picture is not None]
         if not pictures:
             return Value(fn(*(v.factor for v in values)))
+        if any(isinstance(p, ProgramPicture) for p in pictures) or self.programs and self._pending is None and aligned(pictures) is None:
+            return self.apply_program(name, fn, values)
         together = aligned(pictures)
         if together is not None:
             pictures = together
@@ -243,6 +307,7 @@ class Evaluator:
             if v.picture is None:
                 arrays.append(v.factor)
             elif v.picture.mapping != first.mapping:
+                self.plain_or_program()
                 self.note(v.picture.name, "Textures on other coordinates than their partner's, taken as their mean")
                 arrays.append(v.mean())
             else:
@@ -250,6 +315,34 @@ class Evaluator:
         linear = np.maximum(np.broadcast_to(fn(*arrays), (height, width, 3)), 0).astype(np.float32)
         key = (name, self.owner, id(linear))
         return Value(1, Picture(f"{self.owner} {name}", key, first.mapping, first.flags, linear=linear))
+
+    def apply_program(self, name, fn, values):
+        """The same where programs are among the values: by name, or channel by channel from a table."""
+        exprs = [self.expr_of(v) for v in values]
+        open_ones = [k for k, v in enumerate(values) if v.picture is not None]
+        if name == "product":
+            expr = programs.vector_math("MULTIPLY", *exprs)
+        elif name == "sum":
+            expr = programs.vector_math("ADD", *exprs)
+        elif name == "grey":
+            expr = programs.grey(exprs[0])
+        elif name == "clip":
+            expr = programs.clamp(exprs[0])
+        elif name == "complement":
+            expr = programs.complement(exprs[0])
+        elif len(open_ones) == 1:
+            at = open_ones[0]
+            expr = programs.channelwise(exprs[at], lambda x: fn(*(x if k == at else v.factor for k, v in enumerate(values))))
+        else:
+            self.note(name, "Textures taken as their mean")
+            return Value(fn(*(v.mean() for v in values)))
+        return Value(expr.mean) if expr.constant() else Value(1, ProgramPicture(self.owner, expr))
+
+    @staticmethod
+    def expr_of(value):
+        if value.picture is None:
+            return programs.const(value.factor)
+        return programs.vector_math("MULTIPLY", programs.of_picture(value.picture), programs.const(value.factor))
 
     def multiply(self, a, b):
         if a.picture is None:
@@ -298,6 +391,7 @@ class Evaluator:
         return handler(node, output, stack)
 
     def _unknown(self, node, output, stack):
+        self.plain_or_program()
         kind = node.bl_label or node.type
         if node.type == "TEX_CHECKER":
             v = self.mix(Value(0.5), Value(self.value(node.inputs["Color1"], stack).mean()),
@@ -325,10 +419,14 @@ class Evaluator:
         return Value(1, Picture(key[0], ("view", *key), Mapping("VIEW"), library.CLAMP | library.BY_VIEW, linear=linear))
 
     def _fresnel(self, node, output, stack):
+        if node.inputs["Normal"].is_linked:
+            self.plain_or_program()
         ior = max(1e-5, self.number(input_of(node, "IOR"), stack, "Fresnel"))
         return self.by_view(("Fresnel", ior), lambda c, behind: fresnel(c, 1 / ior if behind else ior))
 
     def _layer_weight(self, node, output, stack):
+        if node.inputs["Normal"].is_linked:
+            self.plain_or_program()
         blend = self.number(node.inputs["Blend"], stack, "Layer Weight")
         if output.name == "Fresnel":
             ior = 1 / max(1 - blend, 1e-5)
@@ -449,6 +547,7 @@ class Evaluator:
         elif blend == "MULTIPLY" and f.picture is None and (f.factor == 1).all():
             result = self.multiply(a, b)
         elif _mix_blend(blend, f.factor, a.factor, b.factor) is None:
+            self.plain_or_program()
             self.note(f"mix: {blend.replace('_', ' ').lower()}", "Blend modes taken as plain mixing")
             result = self.mix(f, a, b)
         else:
@@ -531,6 +630,7 @@ class Evaluator:
             return ONE
         mapping = self.mapping(node.inputs["Vector"], stack)
         if mapping is None or node.projection != "FLAT":
+            self.plain_or_program()
             self.note(image.name, "Textures on coordinates other than UV and Generated, taken as their mean")
         flags = {"EXTEND": library.CLAMP, "CLIP": library.CLAMP}.get(node.extension, 0)
         columns, rows = self.images.grid(image)
@@ -539,13 +639,38 @@ class Evaluator:
             if mapping is not None:
                 mapping = Mapping(mapping.source, mapping.uv_map, np.array([[1 / columns], [1 / rows]]) * mapping.matrix)
         elif node.extension in {"CLIP", "MIRROR"}:
+            self.plain_or_program()
             self.note(f"{image.name}: {node.extension.lower()}", "Extensions of images taken as repeat or extend")
         if node.interpolation == "Closest":
             flags |= library.NEAREST
-        divided = node.outputs["Alpha"].is_linked
-        texels = read[0][..., 3:4] if alpha else self.images.colours(image, user, divided)
-        key = (self.images.key(image, user), "alpha" if alpha else divided, flags)
-        picture = Picture(image.name, key, mapping or Mapping(), flags, stored=lambda: (texels, read[1] and not alpha))
+        picture = self.picture(node, alpha, flags, mapping)
         if mapping is None or node.projection != "FLAT":
             return Value(picture.linear().mean((0, 1)))
         return Value(1, picture)
+
+    def picture(self, node, alpha, flags, mapping=None):
+        """Of an image that images.pixels() has read."""
+        image, user = node.image, getattr(node, "image_user", None)
+        read = self.images.pixels(image, user)
+        divided = node.outputs["Alpha"].is_linked if "Alpha" in node.outputs else False
+        texels = read[0][..., 3:4] if alpha else self.images.colours(image, user, divided)
+        key = (self.images.key(image, user), "alpha" if alpha else divided, flags)
+        return Picture(image.name, key, mapping or Mapping(), flags, stored=lambda: (texels, read[1] and not alpha))
+
+    def texels(self, node, alpha):
+        """A program's image, wherever it is looked up: a Picture, or a Value where there is none."""
+        image = node.image
+        if image is None:
+            self.note(node.name, "Image textures without an image, taken as black")
+            return ZERO
+        if self.images.pixels(image, getattr(node, "image_user", None)) is None:
+            return ONE if alpha else Value((1, 0, 1))
+        flags = library.CLAMP if getattr(node, "extension", "REPEAT") in {"EXTEND", "CLIP"} or self.images.grid(image) != (1, 1) else 0
+        return self.picture(node, alpha, flags | (library.NEAREST if node.interpolation == "Closest" else 0))
+
+
+class Quiet:
+    """A report that says nothing."""
+
+    def note(self, *_):
+        pass

@@ -16,6 +16,15 @@ class Image:
 
 
 @dataclasses.dataclass
+class Program:
+    """What stands in an image's place, as lumicut_program has it."""
+    name: str
+    instructions: np.ndarray  # (n, 12) of int32: op, mode, eight inputs, data, count
+    constants: np.ndarray     # (k, 3)
+    table: np.ndarray
+
+
+@dataclasses.dataclass
 class Mesh:
     name: str
     positions: np.ndarray                # (n, 3)
@@ -27,6 +36,12 @@ class Mesh:
     transforms: list = dataclasses.field(default_factory=list)  # 3x4 each, one an instance
     group: int = 0                       # light group of what it emits
     mask: int = 0                        # library.RAYS that see it; 0: all
+    attributes: list = dataclasses.field(default_factory=list)   # (number, library.OF_VERTICES ..., (places, components))
+    of_instances: dict = dataclasses.field(default_factory=dict)  # number: values of each transform, for OF_INSTANCES
+
+    def all_attributes(self):
+        return [*self.attributes, *((number, library.OF_INSTANCES, np.array(values, np.float32).reshape(len(values), -1))
+                                    for number, values in self.of_instances.items())]
 
     def numbers(self):
         """Of all materials in use."""
@@ -107,7 +122,8 @@ class SceneData:
 
     def upload(self, scene, check=lambda: None):
         """Describes itself to a library.Scene. `check` is called between meshes, and may raise."""
-        scene.set_textures([(image.pixels, image.flags) for image in self.images])
+        scene.set_textures([(image.instructions, image.constants, image.table) if isinstance(image, Program) else
+                            (image.pixels, image.flags) for image in self.images])
         scene.set_materials([material for _, material in self.materials])
         for mesh in self.meshes:
             check()
@@ -115,10 +131,10 @@ class SceneData:
                 positions, normals, indices = baked(mesh, check)
                 check()
                 scene.add_mesh(positions, indices, normals, mesh.uvs, mesh.materials, mesh.material, group=mesh.group,
-                               mask=mesh.mask)
+                               mask=mesh.mask, attributes=mesh.all_attributes())
             else:
                 scene.add_mesh(mesh.positions, mesh.indices, mesh.normals, mesh.uvs, mesh.materials, mesh.material,
-                               np.array(mesh.transforms, np.float32), mesh.group, mesh.mask)
+                               np.array(mesh.transforms, np.float32), mesh.group, mesh.mask, mesh.all_attributes())
         scene.set_profiles([(p.vertical, p.horizontal, p.values) for p in self.profiles])
         scene.set_lights([light for _, light in self.lights])
         scene.set_environment(self.environment)

@@ -310,6 +310,8 @@ class Session {
     auto usual = make<lumicut_texture>();
     usual.width = 4, usual.height = 3, usual.channels = 3;
     const auto* textures = descriptors(usual, count, [&](lumicut_texture& t) {
+      if (rarely(3)) return t = make<lumicut_texture>(), t.program = program(), void();
+      t.program = nullptr;
       // What is more is refused.
       const auto limit = [](uint32_t& v, uint32_t most) { v = v > most && v <= 65536 ? most : v; };
       limit(t.width, 9), limit(t.height, 9);
@@ -318,6 +320,41 @@ class Session {
       t.pixels = rarely() ? nullptr : keep(changed(pixels));
     });
     return lumicut_scene_set_textures(handle<lumicut_scene>(kScene), textures, textures == nullptr ? 1 : count);
+  }
+
+  // Mostly in order, each step of earlier ones and of constants.
+  const lumicut_program* program() {
+    const size_t count = in_.ConsumeIntegralInRange<size_t>(0, 6);
+    std::vector<lumicut_instruction> steps;
+    for (size_t i = 0; i < count; ++i) {
+      lumicut_instruction step{};
+      step.op = in_.ConsumeIntegralInRange<uint32_t>(0, LUMICUT_OP_IMAGE);
+      step.mode = in_.ConsumeIntegralInRange<uint32_t>(0, 7);
+      const size_t taken = std::min<size_t>(program_inputs(step.op), 8);
+      for (size_t k = 0; k < taken; ++k)
+        step.inputs[k] = in_.ConsumeIntegralInRange<int32_t>(-4, static_cast<int>(i) - 1);
+      if (step.op == LUMICUT_OP_RAMP) step.count = 6;
+      if (step.op == LUMICUT_OP_CURVES) step.count = 8;
+      if (step.op == LUMICUT_OP_BRICK) step.count = 4;
+      if (step.op == LUMICUT_OP_IMAGE) step.data = 1;
+      steps.push_back(step);
+    }
+    auto usual = make<lumicut_program>();
+    std::vector<float> constants(12, 0.5f), table(8, 0.5f);
+    usual.instruction_count = static_cast<uint32_t>(count), usual.constant_count = 4, usual.table_count = 8;
+    const auto* kept_steps = rarely() ? nullptr : keep(changed(steps));
+    const auto* kept_constants = keep(changed(constants));
+    const auto* kept_table = keep(changed(table));
+    return descriptors(usual, 1, [&](lumicut_program& p) {
+      const auto limit = [](uint32_t& v, uint32_t most) { v = std::min(v, most); };
+      limit(p.instruction_count, static_cast<uint32_t>(count)), limit(p.constant_count, 4), limit(p.table_count, 8);
+      p.instructions = kept_steps, p.constants = kept_constants, p.table = kept_table;
+    });
+  }
+  static uint32_t program_inputs(uint32_t op) {
+    constexpr uint32_t kInputs[] = {0, 0, 0, 0, 0, 0, 0, 1, 3, 3, 1, 1, 3, 3, 6, 4, 4, 3,
+                                    4, 1, 2, 2, 4, 2, 8, 7, 5, 6, 2, 6, 1, 1, 2, 1, 3};
+    return kInputs[op];
   }
 
   lumicut_result set_materials() {
@@ -350,6 +387,16 @@ class Session {
       cap(m.transform_count, instances);
       m.positions = positions, m.normals = normals, m.uvs = uvs, m.indices = indices, m.materials = materials;
       m.transforms = placed;
+      m.attributes = nullptr, m.attribute_count = rarely() ? in_.ConsumeIntegral<uint64_t>() : 0;
+      if (rarely(4)) {
+        auto attribute = make<lumicut_attribute>();
+        attribute.components = 1, attribute.domain = in_.ConsumeIntegralInRange<uint32_t>(0, 2);
+        // As many as the largest mesh has places, of as many components as there may be.
+        const auto* values =
+            keep(changed(std::vector<float>(12 * std::max(g.positions.size(), g.indices.size()), 0.5f)));
+        m.attribute_count = in_.ConsumeIntegralInRange<uint64_t>(1, 2);
+        m.attributes = descriptors(attribute, 2, [&](lumicut_attribute& a) { a.values = rarely() ? nullptr : values; });
+      }
       if (rarely()) m.positions = nullptr;
       if (rarely()) m.indices = nullptr;
     });

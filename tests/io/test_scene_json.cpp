@@ -514,6 +514,47 @@ TEST(SceneJson, EnvironmentsThatAreNotFiniteNameThePixel) {
   EXPECT_EQ(data.environment->texture, 1);
 }
 
+TEST(SceneJson, ProgramsAndAttributesAreRead) {
+  const TemporaryFolder folder;
+  const float tint[4] = {1, 2, 3, 4};
+  folder.write("tint.f32", std::string(reinterpret_cast<const char*>(tint), sizeof(tint)));
+  const auto with = [&](const auto& change) {
+    json s = json::parse(kScene);
+    s["programs"] =
+        json::parse(R"([{"name": "p", "steps": [{"op": "position"}, {"op": "vector", "mode": 2, "inputs": [0, [5]]},
+      {"op": "ramp", "inputs": [1], "table": [0, 0, 0, 1, 1, 1]}, {"op": "attribute", "attribute": "tint"},
+      {"op": "mix", "mode": 2, "inputs": [[0.5], 2, 3]}]}])");
+    s["materials"][0]["diffuse_texture"] = json{{"program", "p"}};
+    s["meshes"][0]["attributes"] =
+        json::parse(R"([{"name": "tint", "domain": "vertices", "components": 1, "file": "tint.f32"}])");
+    change(s);
+    return read_scene(folder.write("scene.json", s.dump()));
+  };
+  const SceneData scene = with([](json&) {});
+  ASSERT_EQ(scene.textures.size(), 1u);
+  ASSERT_TRUE(scene.textures[0].program);
+  const Program& p = *scene.textures[0].program;
+  ASSERT_EQ(p.instructions.size(), 5u);
+  EXPECT_EQ(p.instructions[1].op, uint32_t{LUMICUT_OP_VECTOR});
+  EXPECT_EQ(p.instructions[1].inputs[1], -1);
+  EXPECT_EQ(p.instructions[2].count, 6u);
+  EXPECT_EQ(p.constants, (std::vector<float>{5, 5, 5, 0.5f, 0.5f, 0.5f}));
+  EXPECT_EQ(scene.materials[0].values.diffuse_texture, 1);
+  ASSERT_EQ(scene.meshes[0].attributes.size(), 1u);
+  EXPECT_EQ(scene.meshes[0].attributes[0].id, p.instructions[3].data);
+  EXPECT_EQ(scene.meshes[0].attributes[0].values, (std::vector<float>{1, 2, 3, 4}));
+
+  const auto wrong = [&](const char* pointer, const json& value) {
+    return error_of([&] { with([&](json& s) { s[json::json_pointer(pointer)] = value; }); });
+  };
+  EXPECT_NE(wrong("/programs/0/steps/1/inputs/0", 1).find("programs[0].steps[1].inputs[0]: is 1"), std::string::npos);
+  EXPECT_NE(wrong("/programs/0/steps/1/inputs/1", {1, 2}).find("programs[0].steps[1].inputs[1]"), std::string::npos);
+  EXPECT_NE(wrong("/programs/0/steps/0/op", "place").find("programs[0].steps[0].op"), std::string::npos);
+  EXPECT_NE(wrong("/materials/0/diffuse_texture/program", "q").find("no program \"q\""), std::string::npos);
+  EXPECT_NE(wrong("/meshes/0/attributes/0/components", 2).find("holds 4 numbers for 4 vertices of 2 components"),
+            std::string::npos);
+}
+
 TEST(SceneJson, ScenesOfTheBenchesAreWellFormed) {
   // Their meshes are not part of the project: one triangle stands in for each.
   const TemporaryFolder folder;

@@ -51,7 +51,7 @@ Api fake() {
 
 SceneData example() {
   SceneData data;
-  data.textures.push_back({"a.png", 1, 1, 3, LUMICUT_SRGB, {1, 2, 3}, {}});
+  data.textures.push_back({"a.png", 1, 1, 3, LUMICUT_SRGB, {1, 2, 3}, {}, {}});
   data.materials.push_back({"grey", default_material()});
   Mesh mesh;
   mesh.name = "meshes[0]";

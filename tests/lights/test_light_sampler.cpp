@@ -1,6 +1,7 @@
 // LightSampler: what light paths and direct VPLs carry must be the lights' own power, measured at a distance.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <numbers>
 
 #include "lights/light_sampler.h"
@@ -237,6 +238,52 @@ TEST(LightSampler, TexturedTrianglesHaveThePowerOfTheirOwnPart) {
   }
   EXPECT_NEAR(mean[0] / mean[1], 1.0, 0.01);
   EXPECT_LT(square[0] - mean[0] * mean[0], 0.5 * (square[1] - mean[1] * mean[1]));
+}
+
+// Two triangles of 4 m² whose program emits in every other of 8 x 8 squares, or in none but a small one.
+std::unique_ptr<Scene> programmed_square(bool small) {
+  auto scene = std::make_unique<Scene>(Scene::Config{});
+  const auto op = [](ProgramOp o, std::array<int32_t, 3> inputs, uint32_t mode) {
+    ProgramInstruction in;
+    in.op = static_cast<uint32_t>(o), in.mode = mode;
+    std::copy(inputs.begin(), inputs.end(), in.inputs);
+    return in;
+  };
+  std::vector<ProgramInstruction> steps = {op(ProgramOp::position, {0, 0, 0}, 0), op(ProgramOp::vector, {0, -1, -2}, 4),
+                                           op(ProgramOp::checker, {1, 0, 0}, 0)};
+  if (small)  // where the length of the place is below 0.2
+    steps = {op(ProgramOp::position, {0, 0, 0}, 0), op(ProgramOp::vector, {0, -1, -1}, 12),
+             op(ProgramOp::math, {1, -3, -1}, 13)};
+  std::vector<Texture> textures;
+  textures.emplace_back(TextureProgram(steps, {{4, 4, 4}, {0, 0, 0.5f}, {0.2f, 0.2f, 0.2f}}, {}));
+  scene->set_textures(std::move(textures));
+  Material m;
+  m.emission = {3, 3, 3}, m.emission_texture = 0;
+  scene->set_materials({m});
+  Mesh mesh;
+  test::add_quad(mesh, {0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, 0);
+  scene->add_mesh(mesh);
+  Progress progress;
+  scene->commit(progress);
+  return scene;
+}
+
+TEST(LightSampler, ProgramsEmitWhatTheirValuesAddUpTo) {
+  for (const bool small : {false, true}) {
+    const auto scene = programmed_square(small);
+    // Half of the squares; a quarter of a circle.
+    const double expected = kPi * 3 * (small ? 0.25 * kPi * 0.2 * 0.2 : 2.0);
+    // Places are drawn evenly over the triangles: of the small one few are lit.
+    EXPECT_NEAR(mean_flux(*scene, small ? 4000000 : 20000) / expected, 1.0, 0.02) << small;
+    // The power is by some points of each triangle, the more the less of it is lit.
+    EXPECT_NEAR(LightSampler(*scene).power() / expected, 1.0, small ? 0.3 : 0.05) << small;
+  }
+}
+
+TEST(LightSampler, EveryPlaceThatAProgramLightsHasADensity) {
+  const auto scene = programmed_square(true);
+  const LightSampler emitters(*scene);
+  for (uint32_t t = 0; t < 2; ++t) EXPECT_GT(emitters.mesh_density(scene->place_on(0, t, 0.1f, 0.1f, 0)), 0.0);
 }
 
 TEST(LightSampler, AMillionEmissiveTrianglesTakeAHundredBytesEach) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "lumicut/lumicut.hpp"
+#include "lumicut/lumicut_programs.h"
 
 namespace box {
 

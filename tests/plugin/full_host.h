@@ -63,7 +63,7 @@ struct Host {
   api::Scene scene(const api::Device& device) const {
     api::Scene s(device, accel, robust);
     auto t = textures;
-    for (size_t i = 0; i < t.size(); ++i) t[i].pixels = texels[i].data();
+    for (size_t i = 0; i < t.size(); ++i) t[i].pixels = t[i].program != nullptr ? nullptr : texels[i].data();
     s.set_textures(t);
     s.set_materials(materials);
     s.add_mesh(walls.mesh());

@@ -255,6 +255,51 @@ TEST(Errors, FieldsOfMeshesTexturesCamerasAndEnvironmentsAreCheckedByNameAndValu
   refused_texture([](auto& t) { t.flags = LUMICUT_BY_VIEW, t.width = 1; }, LUMICUT_INVALID_ARGUMENT,
                   "lumicut_texture[0].width: 1 is not even");
 
+  const lumicut_instruction steps[] = {{.op = LUMICUT_OP_UV, .mode = 0, .inputs = {}, .data = 0, .count = 0},
+                                       {.op = LUMICUT_OP_IMAGE, .mode = 0, .inputs = {0, 0, 0}, .data = 0, .count = 0}};
+  const auto refused_program = [&](const std::function<void(lumicut_texture&, lumicut_program&)>& spoil,
+                                   lumicut_result code, const char* text) {
+    auto t = make<lumicut_texture>();
+    auto p = make<lumicut_program>();
+    p.instructions = steps, p.instruction_count = 1, t.program = &p;
+    spoil(t, p);
+    EXPECT_CODE(lumicut_scene_set_textures(s.get(), &t, 1), code, text);
+  };
+  refused_program([](auto& t, auto&) { t.width = 2; }, LUMICUT_INVALID_ARGUMENT,
+                  "lumicut_texture[0].width: 2 is not 0");
+  refused_program([&](auto& t, auto&) { t.pixels = pixels; }, LUMICUT_INVALID_ARGUMENT,
+                  "lumicut_texture[0].pixels: is not NULL");
+  refused_program([](auto&, auto& p) { p.instruction_count = 0; }, LUMICUT_INVALID_ARGUMENT,
+                  "lumicut_texture[0].program.instructions: there is none");
+  refused_program([](auto&, auto& p) { p.instruction_count = 2000; }, LUMICUT_INVALID_ARGUMENT,
+                  "lumicut_texture[0].program.instruction_count: 2000 is more than 1024");
+  refused_program([](auto&, auto& p) { p.instructions = nullptr; }, LUMICUT_INVALID_ARGUMENT,
+                  "lumicut_texture[0].program.instructions: is NULL");
+  refused_program([](auto&, auto& p) { p.table_count = 3; }, LUMICUT_INVALID_ARGUMENT,
+                  "lumicut_texture[0].program.table: is NULL");
+  refused_program([](auto&, auto& p) { p.instruction_count = 2; }, LUMICUT_INVALID_ARGUMENT,
+                  "lumicut_texture[0].program.instructions[1].data: 0 is no texture");
+  refused_program([](auto&, auto& p) { p.struct_size = 8192; }, LUMICUT_INVALID_ARGUMENT, "lumicut_program");
+
+  const float values[300 * 4] = {};
+  const auto refused_attribute = [&](const std::function<void(lumicut_mesh&, lumicut_attribute(&)[2])>& spoil,
+                                     const char* text) {
+    const Geometry walls = geometry();
+    auto m = walls.mesh();
+    lumicut_attribute a[2] = {make<lumicut_attribute>(), make<lumicut_attribute>()};
+    for (auto& each : a) each.components = 1, each.domain = LUMICUT_OF_INSTANCES, each.values = values;
+    a[1].id = 1;
+    m.attributes = a, m.attribute_count = 2;
+    spoil(m, a);
+    EXPECT_CODE(lumicut_scene_add_mesh(s.get(), &m, nullptr), LUMICUT_INVALID_ARGUMENT, text);
+  };
+  refused_attribute([](auto&, auto& a) { a[1].id = 0; }, "lumicut_attribute[1].id: 0 is that of an earlier one");
+  refused_attribute([](auto&, auto& a) { a[0].components = 5; }, "lumicut_attribute[0].components: 5");
+  refused_attribute([](auto&, auto& a) { a[0].domain = 3; }, "lumicut_attribute[0].domain: 3");
+  refused_attribute([](auto&, auto& a) { a[1].values = nullptr; }, "lumicut_attribute[1].values: is NULL");
+  refused_attribute([](auto& m, auto&) { m.attributes = nullptr; }, "lumicut_mesh.attributes: is NULL");
+  refused_attribute([](auto& m, auto&) { m.attribute_count = 300; }, "lumicut_mesh.attribute_count: 300");
+
   const auto refused_camera = [&](const std::function<void(lumicut_camera&)>& spoil, const char* text) {
     auto c = camera();
     spoil(c);

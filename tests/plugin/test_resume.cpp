@@ -40,6 +40,20 @@ std::vector<Change> scene_changes() {
       {"texture.flags srgb", [](Host& h) { h.textures[0].flags = LUMICUT_SRGB; }},
       {"texture.flags clamp", [](Host& h) { h.textures[0].flags = LUMICUT_CLAMP; }},
       {"texture.flags nearest", [](Host& h) { h.textures[0].flags = LUMICUT_NEAREST; }},
+      {"texture.program",
+       [](Host& h) {
+         static const lumicut_instruction uv = {.op = LUMICUT_OP_UV, .mode = 0, .inputs = {}, .data = 0, .count = 0};
+         static auto program = make<lumicut_program>();
+         program.instruction_count = 1, program.instructions = &uv;
+         h.textures[0] = make<lumicut_texture>(), h.textures[0].program = &program;
+       }},
+      {"mesh.attributes",
+       [](Host& h) {
+         static const float value = 1;
+         static auto attribute = make<lumicut_attribute>();
+         attribute.components = 1, attribute.domain = LUMICUT_OF_INSTANCES, attribute.values = &value;
+         h.transforms.resize(12), h.shape.attributes = &attribute, h.shape.attribute_count = 1;
+       }},
       {"texture count", [](Host& h) { h.textures.push_back(h.textures[0]), h.texels.push_back(h.texels[0]); }},
       {"material order", [](Host& h) { std::swap(h.materials[1], h.materials[2]); }},
       {"mesh.positions", [](Host& h) { h.panel.positions[2] -= 0.1f; }},

@@ -1,4 +1,6 @@
 // Level 2: what a scene takes, keeps, and gives back after an error.
+#include <cstring>
+
 #include "box_scene.h"
 #include "tests/support/backends.h"
 
@@ -181,6 +183,64 @@ TEST(Scene, TexturesAreCopiedAndMultiplyTheColour) {
   // The same but for the order of two multiplications.
   ASSERT_EQ(textured.size(), expected.size());
   for (size_t k = 0; k < textured.size(); ++k) ASSERT_NEAR(textured[k], expected[k], 1e-4f + 1e-4f * expected[k]);
+}
+
+TEST(Scene, AProgramOfAConstantIsThatFactor) {
+  const api::Device device(2);
+  const api::Integrator i = integrator(device);
+  api::Scene s = scene(device);
+  auto m = materials();
+  for (auto& each : m) each.diffuse[0] *= 0.5f;
+  s.set_materials(m);
+  s.commit();
+  const auto expected = render(i, s);
+
+  const float constant[3] = {0.5f, 1, 1};
+  lumicut_instruction sum{};
+  sum.op = LUMICUT_OP_CLAMP, sum.inputs[0] = sum.inputs[1] = sum.inputs[2] = -1;
+  auto program = make<lumicut_program>();
+  program.instruction_count = program.constant_count = 1;
+  program.instructions = &sum, program.constants = constant;
+  auto t = make<lumicut_texture>();
+  t.program = &program;
+  s.set_textures({t});
+  m = materials();
+  for (auto& each : m) each.diffuse_texture = 1;
+  s.set_materials(m);
+  s.commit();
+  const auto programmed = render(i, s);
+  for (size_t k = 0; k < programmed.size(); ++k) ASSERT_NEAR(programmed[k], expected[k], 1e-4f + 1e-4f * expected[k]);
+}
+
+// What is told in the camera's terms is another surface to another camera: lights are traced again.
+TEST(Scene, AnotherCameraPreparesAgainWhereProgramsAskForIt) {
+  const api::Device device(1);
+  api::Integrator i = integrator(device, 200);
+  api::Scene s = scene(device);
+  lumicut_instruction depth{};
+  depth.op = LUMICUT_OP_CAMERA, depth.mode = 2;
+  lumicut_instruction wave{};
+  wave.op = LUMICUT_OP_WAVE, wave.inputs[1] = wave.inputs[2] = wave.inputs[3] = wave.inputs[4] = wave.inputs[5] = -1;
+  const lumicut_instruction steps[] = {depth, wave};
+  const float zero[3] = {};
+  auto program = make<lumicut_program>();
+  program.instruction_count = 2, program.constant_count = 1, program.instructions = steps, program.constants = zero;
+  auto t = make<lumicut_texture>();
+  t.program = &program;
+  s.set_textures({t});
+  auto m = materials();
+  for (auto& each : m) each.diffuse_texture = 1;
+  s.set_materials(m);
+  s.commit();
+  i.prepare(s);
+  const auto before = i.lights();
+  auto moved = camera();
+  moved.to_world[11] += 0.1f;
+  s.set_camera(moved);
+  s.commit();
+  i.prepare(s);
+  const auto after = i.lights();
+  EXPECT_NE(std::memcmp(before.data(), after.data(), std::min(before.size(), after.size()) * sizeof(lumicut_vpl)), 0);
 }
 
 TEST(Scene, BrokenNormalsAndTextureCoordinatesAreMended) {

@@ -91,17 +91,35 @@ TEST(Identity, EveryFieldOfAFrameCounts) {
   EXPECT_EQ(expect_every_field_counts(frame), 13u);
 }
 TEST(Identity, EveryFieldOfAMeshCounts) {
-  EXPECT_EQ(expect_every_field_counts(Mesh{}), 9u);
+  EXPECT_EQ(expect_every_field_counts(Mesh{}), 10u);
   Mesh mesh;
   mesh.positions.resize(2), mesh.normals.resize(1), mesh.uvs.resize(1), mesh.instances.resize(1);
   mesh.indices = {1}, mesh.triangle_materials = {2};
-  EXPECT_EQ(expect_every_field_counts(mesh), 9u + 3 + 3 + 2 + 1 + 1 + 12);
+  MeshAttribute attribute;
+  attribute.values = {1};
+  mesh.attributes = {attribute};
+  EXPECT_EQ(expect_every_field_counts(mesh), 10u + 3 + 3 + 2 + 1 + 1 + 12 + 5);
 }
 TEST(Identity, EveryFieldOfATextureCounts) {
   const uint8_t bytes[] = {1, 2};
   const float floats[] = {1, 2};
   EXPECT_EQ(expect_every_field_counts(Texture(2, 1, 1, Texture::Format::uint8, {}, bytes)), 11u);
   EXPECT_EQ(expect_every_field_counts(Texture(2, 1, 1, Texture::Format::float32, {}, floats)), 11u);
+}
+TEST(Identity, EveryFieldOfATextureProgramCounts) {
+  ProgramInstruction position;
+  position.op = static_cast<uint32_t>(ProgramOp::position);
+  // Of an instruction its operation, mode, eight inputs, data and count; constants, the table, what bumps need.
+  EXPECT_EQ(expect_every_field_counts(TextureProgram({position}, {{}}, {0})), 1u + 12 + 1 + 3 + 1 + 1 + 1);
+}
+TEST(Identity, TexturesCountByTheirProgram) {
+  const auto hash = [](ProgramOp op) {
+    ProgramInstruction in;
+    in.op = static_cast<uint32_t>(op);
+    return hash_value(0, Texture(TextureProgram({in}, {}, {})));
+  };
+  EXPECT_EQ(hash(ProgramOp::uv), hash(ProgramOp::uv));
+  EXPECT_NE(hash(ProgramOp::uv), hash(ProgramOp::position));
 }
 TEST(Identity, EveryFieldOfLightTracingCounts) { EXPECT_EQ(expect_every_field_counts(VplOptions{}), 6u); }
 TEST(Identity, EveryFieldOfALightProfileCounts) {

@@ -79,6 +79,9 @@ typedef struct lumicut_accel_t* lumicut_accel;
 typedef struct lumicut_scene_t* lumicut_scene;
 typedef struct lumicut_integrator_t* lumicut_integrator;
 typedef struct lumicut_render_t* lumicut_render;
+/* Programs in place of textures, and what they ask of meshes: described in lumicut_programs.h. */
+typedef struct lumicut_program lumicut_program;
+typedef struct lumicut_attribute lumicut_attribute;
 
 /* ---- Library and devices ------------------------------------------------------------------------------------------ */
 
@@ -183,6 +186,8 @@ typedef struct lumicut_mesh {
   uint64_t transform_count;
   uint32_t material;
   uint32_t group;             /* light group of what it emits, 0..2^16-1 */
+  const lumicut_attribute* attributes; /* what programs ask for (lumicut_programs.h); NULL: none */
+  uint64_t attribute_count;
 } lumicut_mesh;
 
 typedef struct lumicut_light {
@@ -305,6 +310,7 @@ typedef struct lumicut_texture {
   uint32_t format;   /* LUMICUT_UINT8 (0..255 -> 0..1) or LUMICUT_FLOAT32 */
   uint32_t flags;    /* LUMICUT_SRGB: decode; LUMICUT_CLAMP: no repeat; LUMICUT_NEAREST: no filter; LUMICUT_BY_VIEW: below */
   const void* pixels; /* row 0 is the top row (v = 1), rows packed */
+  const lumicut_program* program; /* computes the value in place of an image; all fields above are 0 then. NULL: an image */
 } lumicut_texture;
 enum { LUMICUT_UINT8 = 0, LUMICUT_FLOAT32 = 1 };
 /* With LUMICUT_BY_VIEW the texture is looked up by how the surface is seen, not by uv: its right half is for the front, from

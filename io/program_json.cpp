@@ -1,0 +1,128 @@
+#include "io/program_json.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+#include "io/file_error.h"
+
+namespace lumicut::io {
+
+namespace {
+
+// In the order of LUMICUT_OP_...
+const std::vector<std::string> kOps = {
+    "uv",     "attribute", "position", "normal",  "to_viewer", "behind",      "camera",  "transform", "math",
+    "vector", "grey",      "separate", "combine", "clamp",     "map_range",   "mapping", "rotate",    "mix",
+    "color",  "ramp",      "curves",   "fresnel", "bump",      "normal_map",  "noise",   "musgrave",  "voronoi",
+    "wave",   "magic",     "brick",    "checker", "gradient",  "white_noise", "project", "image"};
+
+constexpr double kLargest = 3e38;
+
+class ProgramReader {
+ public:
+  ProgramReader(const std::function<uint32_t(const std::string&)>& attribute,
+                const std::function<int32_t(const JsonValue&)>& image)
+      : attribute_(attribute), image_(image) {}
+
+  Program read(const JsonValue& value) {
+    JsonObject object(value);
+    for (const auto& element : object.need("instructions").elements()) instruction(element);
+    object.finish();
+    return std::move(program_);
+  }
+
+ private:
+  void instruction(const JsonValue& value) {
+    JsonObject object(value);
+    lumicut_instruction out{};
+    out.op = static_cast<uint32_t>(object.need("op").choice(kOps));
+    out.mode = static_cast<uint32_t>(object.integer("mode", 0, 0, 1 << 20));
+    if (auto inputs = object.find("inputs")) {
+      const auto elements = inputs->elements();
+      if (elements.size() > std::size(out.inputs)) inputs->fail_expected("an array of at most 8");
+      for (size_t i = 0; i < elements.size(); ++i) out.inputs[i] = input(elements[i]);
+    }
+    if (auto table = object.find("table")) {
+      out.data = static_cast<uint32_t>(program_.table.size());
+      for (const auto& number : table->elements())
+        program_.table.push_back(static_cast<float>(number.number(-kLargest, kLargest)));
+      out.count = static_cast<uint32_t>(program_.table.size()) - out.data;
+    }
+    if (auto name = object.find("attribute")) {
+      if (out.count != 0) name->fail("stands beside a \"table\"");
+      out.data = attribute_(name->text());
+    }
+    if (auto image = object.find("image")) out.data = static_cast<uint32_t>(image_(*image));
+    object.finish();
+    program_.instructions.push_back(out);
+  }
+
+  // An integer is an earlier instruction, an array of one or three numbers a constant.
+  int32_t input(const JsonValue& value) {
+    if (!value.raw().is_array())
+      return static_cast<int32_t>(value.integer(0, static_cast<int64_t>(program_.instructions.size()) - 1));
+    const size_t n = value.raw().size();
+    if (n != 1 && n != 3) value.fail_expected("an instruction's number, or an array of one number or three");
+    const auto given = value.numbers(n, -kLargest, kLargest);
+    for (size_t k = 0; k < 3; ++k) program_.constants.push_back(static_cast<float>(given[n == 1 ? 0 : k]));
+    return -static_cast<int32_t>(program_.constants.size() / 3);
+  }
+
+  const std::function<uint32_t(const std::string&)>& attribute_;
+  const std::function<int32_t(const JsonValue&)>& image_;
+  Program program_;
+};
+
+std::vector<float> floats_of(const std::string& path, uint64_t most) {
+  const std::string bytes = read_whole_file(path, most * sizeof(float));
+  if (bytes.size() % sizeof(float) != 0)
+    throw FileError(path, fmt::format("has {} bytes, no multiple of 4", bytes.size()));
+  std::vector<float> out(bytes.size() / sizeof(float));
+  static_assert(std::endian::native == std::endian::little);
+  if (!out.empty()) std::memcpy(out.data(), bytes.data(), bytes.size());
+  return out;
+}
+
+}  // namespace
+
+Program read_program(const JsonValue& value, const std::function<uint32_t(const std::string&)>& attribute,
+                     const std::function<int32_t(const JsonValue&)>& image) {
+  return ProgramReader(attribute, image).read(value);
+}
+
+std::vector<Attribute> read_attributes(const JsonValue& value, const Mesh& mesh, size_t instances,
+                                       const std::function<uint32_t(const std::string&)>& attribute,
+                                       const std::function<std::string(const JsonValue&)>& resolve) {
+  std::vector<Attribute> out;
+  for (const auto& element : value.elements()) {
+    JsonObject object(element);
+    Attribute a;
+    a.id = attribute(object.need("name").text());
+    a.domain = static_cast<uint32_t>(object.need("domain").choice({"vertices", "triangles", "instances"}));
+    a.components = static_cast<uint32_t>(object.need("components").integer(1, 12));
+    const size_t places = a.domain == LUMICUT_OF_VERTICES    ? mesh.positions.size() / 3
+                          : a.domain == LUMICUT_OF_TRIANGLES ? mesh.indices.size() / 3
+                                                             : instances;
+    const auto file = object.find("file");
+    const auto values = file ? *file : object.need("values");
+    if (file) {
+      a.values = floats_of(resolve(*file), uint64_t{places} * a.components);
+    } else {
+      for (const auto& number : values.elements())
+        a.values.push_back(static_cast<float>(number.number(-kLargest, kLargest)));
+    }
+    if (a.values.size() != places * a.components)
+      values.fail(fmt::format("holds {} numbers for {} {} of {} components", a.values.size(), places,
+                              object.need("domain").text(), a.components));
+    if (std::any_of(out.begin(), out.end(), [&](const Attribute& other) { return other.id == a.id; }))
+      object.need("name").fail("stands here already");
+    object.finish();
+    out.push_back(std::move(a));
+  }
+  return out;
+}
+
+}  // namespace lumicut::io
