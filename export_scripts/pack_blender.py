@@ -22,8 +22,8 @@ def main():
     for where, version in (("blender_manifest.toml", found), ("bl_info", ".".join(info.groups()))):
         if version != options.version:
             sys.exit(f"{options.addon}: {where} says version {version}, the project {options.version}")
-    files = {f"{NAME}/{path.name}": path.read_bytes() for path in sorted(options.addon.iterdir())
-             if path.suffix in {".py", ".toml"}}
+    files = {f"{NAME}/{path.relative_to(options.addon)}": path.read_bytes()
+             for folder in (options.addon, options.addon / "lumicut") for path in sorted(folder.iterdir()) if path.suffix in {".py", ".toml"}}
     files[f"{NAME}/LICENSE"] = options.license.read_bytes()
     for name, _, path in (notice.partition("=") for notice in options.notice):
         files[f"{NAME}/licenses/{name}.txt"] = pathlib.Path(path).read_bytes()

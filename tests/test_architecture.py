@@ -145,7 +145,7 @@ class Version(unittest.TestCase):
     def test_the_add_on_knows_the_abi_of_the_header(self):
         header = (ROOT / "plugin/include/lumicut/lumicut.h").read_text()
         abi = [int(re.search(rf"^#define LUMICUT_ABI_{part} (\d+)$", header, re.MULTILINE)[1]) for part in ("MAJOR", "MINOR")]
-        python = (ROOT / "export_scripts/lumicut_blender/library.py").read_text()
+        python = (ROOT / "export_scripts/lumicut/library.py").read_text()
         self.assertEqual(re.search(r"^ABI_MAJOR, ABI_MINOR = (\d+), (\d+)$", python, re.MULTILINE).groups(), tuple(map(str, abi)))
 
 

@@ -16,7 +16,8 @@ if "bpy" in locals():  # reloaded by the host: its parts, too, from the bottom u
                   lights, worlds, cameras, soft_spots, collect, runtime, properties, passes, export, viewport, engine, preferences, panels):  # noqa: F821
         importlib.reload(_part)
 else:
-    from . import (cameras, collect, directions, engine, export, ies, images, library, lights, mappings, materials, mesh_attributes, nodes, panels,  # noqa: F401
+    from .lumicut import library  # noqa: F401
+    from . import (cameras, collect, directions, engine, export, ies, images, lights, mappings, materials, mesh_attributes, nodes, panels,  # noqa: F401
                    passes, preferences, programs, properties, report, runtime, scene_data, sky, soft_spots, viewport, worlds)
 
 import bpy  # noqa: E402, F401

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from mathutils import Matrix
 
-from . import library
+from .lumicut import library
 
 
 def rows(matrix):

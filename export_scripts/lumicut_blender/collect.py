@@ -7,7 +7,8 @@ each set of materials; its instances are transforms.
 import bpy
 import numpy as np
 
-from . import library, lights, mesh_attributes, soft_spots, worlds
+from . import lights, mesh_attributes, soft_spots, worlds
+from .lumicut import library
 from .cameras import rows
 from .materials import Materials
 from .report import Report

@@ -7,7 +7,8 @@ import traceback
 
 import bpy
 
-from . import cameras, collect, export, library, passes, properties, runtime, sky, viewport
+from . import cameras, collect, export, passes, properties, runtime, sky, viewport
+from .lumicut import library
 from .report import Report
 
 POLL_MS = 40

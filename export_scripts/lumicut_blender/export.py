@@ -15,7 +15,8 @@ import zlib
 
 import numpy as np
 
-from . import library, properties
+from . import properties
+from .lumicut import library
 from .scene_data import Program
 
 

@@ -5,7 +5,7 @@ import re
 import bpy
 import numpy as np
 
-from . import library
+from .lumicut import library
 from .scene_data import Image
 
 LINEAR_SPACES = {"Non-Color", "Raw", "Linear", "Linear Rec.709", "scene_linear"}

@@ -6,7 +6,8 @@ import os
 import bpy
 import numpy as np
 
-from . import ies, library
+from . import ies
+from .lumicut import library
 from .directions import Directions
 from .nodes import Value
 from .scene_data import Profile

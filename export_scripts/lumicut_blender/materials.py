@@ -10,7 +10,8 @@ import math
 import bpy
 import numpy as np
 
-from . import library, volumes
+from . import volumes
+from .lumicut import library
 from .images import Images, Picture, image_of
 from .mappings import Mapping, aligned
 from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Value, input_of

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from . import library
+from .lumicut import library
 from .images import Picture
 from .mappings import Mapping, aligned, sized
 from .programs import CannotCompile, NeedsProgram, ProgramPicture

@@ -3,7 +3,8 @@
 import bpy
 import numpy as np
 
-from . import library, properties
+from . import properties
+from .lumicut import library
 
 FLAT_RECTS = bpy.app.version >= (4, 1, 0)
 NO_DEPTH = 1e10  # as Cycles has it where nothing is hit

@@ -6,7 +6,7 @@ Numbers, vectors and colours are all three numbers; a single one stands in all t
 """
 import numpy as np
 
-from . import library
+from .lumicut import library
 from .images import Picture
 from .mappings import Mapping
 from .scene_data import Program

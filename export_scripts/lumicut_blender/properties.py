@@ -3,7 +3,8 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
 
-from . import library, runtime
+from . import runtime
+from .lumicut import library
 
 COMMON = "common"  # the group of parameters that nearly all integrators share
 ACCELS = [

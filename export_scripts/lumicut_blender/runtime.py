@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What lives as long as the add-on is on: the library, one device, and what the last render said of itself."""
+import pathlib
+
 import bpy
 
-from . import library
+from .lumicut import library
 
+FOLDER = pathlib.Path(__file__).parent / "lib"  # of the zip
 _state = {"library": None, "failure": "", "device": None, "threads": None, "accels": {}}
 last = {"stats": {}, "notes": [], "collect_seconds": 0.0, "seconds": 0.0, "integrator": "", "scene": {}}
 
@@ -22,7 +25,7 @@ def load(path=None):
     """Looks for the library again. Keeps the reason where there is none."""
     release()
     try:
-        _state["library"], _state["failure"] = library.Library(preference_path() if path is None else path), ""
+        _state["library"], _state["failure"] = library.Library(preference_path() if path is None else path, FOLDER), ""
     except library.LibraryMissing as reason:
         _state["library"], _state["failure"] = None, str(reason)
     return _state["library"]

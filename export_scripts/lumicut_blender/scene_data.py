@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from . import library
+from .lumicut import library
 
 
 @dataclasses.dataclass

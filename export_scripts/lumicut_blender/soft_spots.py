@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from . import library
+from .lumicut import library
 
 MOST, BUDGET = 64, 1024  # spots in place of one, of all in a scene
 

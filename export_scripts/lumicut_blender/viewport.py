@@ -13,7 +13,8 @@ import gpu
 import numpy as np
 from gpu_extras.presets import draw_texture_2d
 
-from . import cameras, collect, library, passes, properties, runtime, sky
+from . import cameras, collect, passes, properties, runtime, sky
+from .lumicut import library
 from .images import Images
 from .report import Report
 

@@ -2,7 +2,8 @@
 """The world: what lights, its suns, and what the camera alone sees in its place."""
 import numpy as np
 
-from . import library, sky
+from . import sky
+from .lumicut import library
 from .directions import Directions
 from .images import Picture
 from .mappings import Mapping

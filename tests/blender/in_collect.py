@@ -6,7 +6,8 @@ import bpy
 import numpy as np
 
 import helpers as h
-from lumicut_blender import collect, library, materials, report
+from lumicut_blender import collect, materials, report
+from lumicut_blender.lumicut import library
 
 
 def collected(max_shininess=1000.0):

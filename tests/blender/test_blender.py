@@ -50,6 +50,7 @@ class Home:
     def environment(self, library=LIBRARY):
         env = {k: v for k, v in os.environ.items() if not k.startswith(("BLENDER_USER", "LUMICUT_"))}
         env |= {"BLENDER_USER_SCRIPTS": str(self.path / "scripts"), "BLENDER_USER_CONFIG": str(self.path / "config"),
+                "BLENDER_USER_EXTENSIONS": str(self.path / "extensions"),
                 "LUMICUT_SOURCE_DIR": str(ROOT), "LUMICUT_BINARY_DIR": str(BUILD), "HOME": str(self.path),
                 "PYTHONDONTWRITEBYTECODE": "1",
                 # Blender's Python takes its home from the first python3 in PATH, which may be another version's.
@@ -144,7 +145,7 @@ class Farms(Blender):
 
     @unittest.skipIf(ZIP, "the zip's own library is there")
     def test_a_library_of_another_abi_is_refused_by_number(self):
-        names = re.findall(r'^    "(\w+)": \(', (ROOT / "export_scripts/lumicut_blender/library.py").read_text(), re.M)
+        names = re.findall(r'^    "(\w+)": \(', (ROOT / "export_scripts/lumicut/library.py").read_text(), re.M)
         self.assertGreater(len(names), 20)
         source = self.home.path / "wrong.c"
         source.write_text(WRONG_LIBRARY + "".join(f"int lumicut_{n}(void) {{ return 0; }}\n" for n in names if n != "version"))
@@ -259,8 +260,7 @@ class TheZip(Blender):
 
     def extension(self, *words):
         """`blender --command extension`, as this home's user."""
-        env = self.home.environment(library=None) | {"BLENDER_USER_EXTENSIONS": str(self.home.path / "extensions")}
-        return subprocess.run([BLENDER, "--command", "extension", *map(str, words)], env=env, cwd=self.home.path, stdin=subprocess.DEVNULL,
+        return subprocess.run([BLENDER, "--command", "extension", *map(str, words)], env=self.home.environment(library=None), cwd=self.home.path, stdin=subprocess.DEVNULL,
                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", timeout=PATIENCE)
 
     def in_extension(self, code):

@@ -10,7 +10,7 @@ import abi
 
 ROOT = abi.ROOT
 DESCRIPTORS, MAP = "plugin/descriptors.h", "plugin/lumicut.map"
-WRAPPER, PYTHON, PAGE = "plugin/include/lumicut/lumicut.hpp", "export_scripts/lumicut_blender/library.py", "docs/c_abi.md"
+WRAPPER, PYTHON, PAGE = "plugin/include/lumicut/lumicut.hpp", "export_scripts/lumicut/library.py", "docs/c_abi.md"
 SCALARS = {"float": ctypes.c_float, "double": ctypes.c_double, "int32_t": ctypes.c_int32, "uint32_t": ctypes.c_uint32,
            "uint64_t": ctypes.c_uint64, "lumicut_result": ctypes.c_int32, "void": None}
 
@@ -124,9 +124,10 @@ class Ctypes:
 
 def python_module():
     try:
-        import numpy  # noqa: F401
+        import numpy
     except ImportError:
-        sys.modules["numpy"] = types.ModuleType("numpy")  # declarations need none of it
+        numpy = sys.modules["numpy"] = types.ModuleType("numpy")  # declarations need none of it but these names
+        numpy.dtype, numpy.ndarray = lambda structure: structure, object
     spec = importlib.util.spec_from_file_location("lumicut_library", ROOT / PYTHON)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

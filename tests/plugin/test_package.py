@@ -128,7 +128,8 @@ class Install(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = tempfile.TemporaryDirectory()
         base = pathlib.Path(cls.folder.name)
-        run(CMAKE, "--install", BUILD, "--component", "plugin", "--prefix", base / "first")
+        for component in ("library", "development"):
+            run(CMAKE, "--install", BUILD, "--component", component, "--prefix", base / "first")
         cls.prefix = base / "moved"  # an installed tree may be moved
         (base / "first").rename(cls.prefix)
         cls.project = base / "host"

@@ -76,7 +76,7 @@ embree.rtcNewDevice.restype = ctypes.c_void_p
 device = ctypes.c_void_p(embree.rtcNewDevice(b"threads=2"))
 assert device
 sys.path.insert(0, host)
-import library as lumicut
+import lumicut
 import os
 os.environ["LUMICUT_LIBRARY"] = library
 loaded = lumicut.Library()
@@ -114,7 +114,7 @@ class Beside(Zip):
         with tempfile.TemporaryDirectory() as folder:
             program = pathlib.Path(folder) / "host.py"
             program.write_text(FOREIGN)
-            shutil.copy(ROOT / "export_scripts/lumicut_blender/library.py", folder)
+            shutil.copytree(ROOT / "export_scripts/lumicut", pathlib.Path(folder) / "lumicut")
             text = run("/usr/bin/python3", program, self.library, folder, *others)
         self.assertGreater(float(re.search(r"mean (\S+)", text)[1]), 0.01)
 

@@ -7,6 +7,7 @@ All functions have their signatures (a missing one truncates pointers); ctypes r
 import ctypes
 import ctypes.util
 import json
+import math
 import os
 import pathlib
 import sys
@@ -29,8 +30,9 @@ HIDDEN = 1  # of Environment.flags
 CAMERA_RAYS, DIFFUSE_RAYS, GLOSSY_RAYS, TRANSMISSION_RAYS, SHADOW_RAYS = 1, 2, 4, 8, 16  # of Mesh.mask
 RAYS = {"camera": CAMERA_RAYS, "diffuse": DIFFUSE_RAYS, "glossy": GLOSSY_RAYS, "transmission": TRANSMISSION_RAYS, "shadow": SHADOW_RAYS}
 ALL_RAYS = sum(RAYS.values())
-CHECKPOINTS, ILLUMINANCE, GROUPS = 1, 2, 4  # of RenderDesc.flags
+CHECKPOINTS, ILLUMINANCE, GROUPS, DENOISE, KEEP_FIREFLIES = 1, 2, 4, 8, 16  # of RenderDesc.flags
 VIRTUAL_LIGHTS, LIGHT_GROUPS, COMPENSATION, SAVED_STATE, VIEW_INDEPENDENT, ALL_LIGHTS = 1, 2, 4, 8, 16, 32  # traits
+SOURCE_PATH, SOURCE_POINT, SOURCE_AREA = range(3)  # of VplOrigin.source
 VPL_OMNI, VPL_ORIENTED, VPL_DIRECTIONAL, VPL_SPOT, VPL_SPHERE = range(5)
 FOREVER = NO_ID = 0xFFFFFFFF
 # Operations of texture programs, LUMICUT_OP_..., from 0 on; and the domains of attributes.
@@ -224,6 +226,27 @@ class ChannelInfo(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("components", c_uint32), ("name", c_char_p), ("description", c_char_p)]
 
 
+# ---- lumicut_lights.h
+
+
+class VplOrigin(Structure):
+    _fields_ = [("source", c_uint32), ("offset", c_float), ("area", c_float)]
+
+
+class VplSet(Descriptor):
+    _fields_ = [("struct_size", c_uint32), ("reserved", c_uint32), ("count", c_uint64), ("lights", c_void_p),
+                ("origins", c_void_p), ("light_paths", c_uint64), ("emitter_samples", c_uint64)]
+
+
+class LightsExtension(Structure):
+    _fields_ = [("struct_size", c_uint32), ("reserved", c_uint32),
+                ("get", ctypes.CFUNCTYPE(c_int32, c_void_p, POINTER(VplSet))),
+                ("set", ctypes.CFUNCTYPE(c_int32, c_void_p, POINTER(VplSet)))]
+
+
+# The same records as NumPy has them.
+VPL, VPL_ORIGIN, POINT_TO_SHADE, RAY, RAYHIT = map(np.dtype, (Vpl, VplOrigin, Point, Ray, Rayhit))
+
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
 SIZES = {Ray: 48, Hit: 32, Rayhit: 80, Vpl: 64, Point: 64, DeviceDesc: 32, Status: 64, AccelDesc: 80, AccelInfo: 80,
          AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 40, Material: 164, Mesh: 104, Light: 116, Profile: 40,
@@ -283,11 +306,11 @@ def library_name():
     return "lumicut.dll" if os.name == "nt" else "liblumicut.so.1"
 
 
-def candidates(preference=""):
+def candidates(preference="", folder=None):
     """(origin, path) to try in order: the one in the add-on's folder, the preference's, the system's."""
     found = []
-    bundled = pathlib.Path(__file__).resolve().parent / "lib" / library_name()
-    if bundled.exists():
+    bundled = pathlib.Path(folder) / library_name() if folder else None
+    if bundled is not None and bundled.exists():
         found.append(("bundled with the add-on", str(bundled)))
     if preference:
         path = pathlib.Path(preference)
@@ -337,9 +360,10 @@ class IntegratorRow(typing.NamedTuple):
 class Library:
     """The loaded library and its tables. Raises Error where a call fails, Cancelled where it was cancelled."""
 
-    def __init__(self, preference=""):
+    def __init__(self, preference="", folder=None):
+        """`preference`: a file or folder to look in. `folder`: where a host has its own, looked in first."""
         tried = []
-        for origin, path in candidates(preference):
+        for origin, path in candidates(preference, folder):
             try:
                 self.dll, self.version, self.abi = load_file(path)
             except (OSError, LibraryMissing) as reason:
@@ -349,8 +373,8 @@ class Library:
             return
         bundled = any(line.startswith("bundled") for line in tried)
         cure = ("Restart Blender if the add-on was just updated. Otherwise install the zip that build_zip.sh makes, whose library needs "
-                "nothing of the machine," if bundled else "Install the zip that holds it,")
-        raise LibraryMissing("no usable Lumicut library. Tried " + " | ".join(tried) + f". {cure} or name its file in the add-on's preferences")
+                "nothing of the machine," if bundled else "Install it,")
+        raise LibraryMissing("no usable Lumicut library. Tried " + " | ".join(tried) + f". {cure} or name its file in LUMICUT_LIBRARY or in the add-on's preferences")
 
     def check(self, code):
         if code == OK:
@@ -540,9 +564,112 @@ class Integrator(Handle):
 
     def set(self, name, value):
         self._call("integrator_set", name.encode(), str(value).encode())
+        return self
+
+    def get(self, name):
+        text = self.library.dll.lumicut_integrator_get(self.pointer, name.encode())
+        if text is None:
+            self.library.check(INVALID_ARGUMENT)
+        return text.decode()
 
     def prepare(self, scene):
+        """Traces the virtual lights and builds what the method needs of them."""
         self._call("integrator_prepare", scene.pointer)
+
+    def set_lights(self, lights, origins=None):
+        """Virtual lights in place of those traced: an array of dtype VPL, none to trace again. With `origins`, as lights()
+        gives them, the image is the one that they came from."""
+        lights = np.ascontiguousarray(lights, VPL)
+        if origins is None:
+            self._call("integrator_set_lights", lights.ctypes.data_as(POINTER(Vpl)), lights.size)
+            return
+        drawn, origins = getattr(origins, "emitter_samples", 0), np.ascontiguousarray(origins, VPL_ORIGIN)
+        if origins.size != lights.size:
+            raise Error(INVALID_ARGUMENT, f"origins: {origins.size} for {lights.size} lights")
+        samples = max(drawn, int((origins["source"] == SOURCE_AREA).sum()))
+        vpls = VplSet(count=lights.size, lights=lights.ctypes.data, origins=origins.ctypes.data, emitter_samples=samples)
+        self.library.check(self._extension().set(self.pointer, ctypes.byref(vpls)))
+
+    def lights(self):
+        """(lights, origins) after prepare: copies, of dtypes VPL and VPL_ORIGIN."""
+        vpls = VplSet()
+        self.library.check(self._extension().get(self.pointer, ctypes.byref(vpls)))
+        lights = _copied(vpls.lights, vpls.count, VPL)
+        origins = _copied(vpls.origins, vpls.count, VPL_ORIGIN).view(Origins)
+        origins.emitter_samples = vpls.emitter_samples
+        return lights, origins
+
+    def shade(self, points):
+        """(n, 3) radiance towards the viewer of an array of dtype POINT_TO_SHADE, after prepare."""
+        points = np.ascontiguousarray(points, POINT_TO_SHADE)
+        out = np.empty((points.size, 3), np.float32)
+        self._call("integrator_shade", points.ctypes.data_as(POINTER(Point)), points.size, out.ctypes.data)
+        return out
+
+    def _extension(self):
+        table = self.library.dll.lumicut_get_extension(b"lumicut.lights/1")
+        if not table:
+            raise Error(UNSUPPORTED, "the library lacks the extension lumicut.lights/1")
+        return ctypes.cast(table, POINTER(LightsExtension))[0]
+
+
+class Origins(np.ndarray):
+    """An array of VPL_ORIGIN. `emitter_samples`: how many places were drawn on emitters with extent."""
+
+    emitter_samples = 0
+
+    def __array_finalize__(self, other):
+        self.emitter_samples = getattr(other, "emitter_samples", 0)
+
+
+def _copied(address, count, dtype):
+    if not count:
+        return np.empty(0, dtype)
+    return np.frombuffer((ctypes.c_char * (count * dtype.itemsize)).from_address(address), dtype).copy()
+
+
+class Accel(Handle):
+    """Rays against triangles: positions (n, 3), indices (m, 3). `kind`, `builder` and `robust` as of a scene."""
+
+    def __init__(self, device, positions, indices, kind=None, builder=None, robust=True):
+        super().__init__(device.library)
+        positions, indices = _rows(positions, np.float32, 3), _rows(indices, np.uint32, 3)
+        self._create("accel_build", device.pointer, ctypes.byref(AccelDesc(
+            robust=ROBUST if robust else FAST, kind=kind.encode() if kind else None, builder=builder.encode() if builder else None,
+            positions=positions.ctypes.data, position_count=len(positions), indices=indices.ctypes.data, triangle_count=len(indices))))
+
+    def info(self):
+        info = AccelInfo()
+        self._call("accel_get_info", ctypes.byref(info))
+        return info
+
+    def intersect(self, origins, directions, near=0.0, far=math.inf):
+        """(distance, triangle, u, v, normal) of the closest hit of each ray: infinity and NO_ID where there is none.
+        Distances are in units of the direction's length; normals are geometric and not of unit length."""
+        rays = np.zeros(len(origins), RAYHIT)
+        _fill(rays["ray"], origins, directions, near, far)
+        rays["hit"]["geom_id"] = NO_ID
+        self._call("accel_intersect", rays.ctypes.data_as(POINTER(Rayhit)), rays.size)
+        hit, missed = rays["hit"], rays["hit"]["geom_id"] == NO_ID
+        return (np.where(missed, np.float32(np.inf), rays["ray"]["tfar"]), np.where(missed, np.uint32(NO_ID), hit["prim_id"]),
+                hit["u"].copy(), hit["v"].copy(), np.stack([hit["ng_x"], hit["ng_y"], hit["ng_z"]], -1))
+
+    def occluded(self, origins, directions, near=0.0, far=math.inf):
+        """Whether anything lies on each ray between near and far."""
+        rays = np.zeros(len(origins), RAY)
+        _fill(rays, origins, directions, near, far)
+        self._call("accel_occluded", rays.ctypes.data_as(POINTER(Ray)), rays.size)
+        return rays["tfar"] == -np.inf
+
+
+def _fill(rays, origins, directions, near, far):
+    for name, values in (("org", origins), ("dir", directions)):
+        values = np.asarray(values, np.float32)
+        if values.shape != (rays.size, 3):
+            raise Error(INVALID_ARGUMENT, f"rays: {name} has the shape {values.shape}, not ({rays.size}, 3)")
+        for axis, column in zip("xyz", values.T):
+            rays[f"{name}_{axis}"] = column
+    rays["tnear"], rays["tfar"], rays["mask"] = near, far, 0xFFFFFFFF
 
 
 class Render(Handle):

@@ -1,0 +1,96 @@
+#!/usr/bin/env bash
+# The Debian packages (cmake --build --preset packages --target package) in a bare Debian 12 tree: the command renders,
+# a host finds the library with CMake and with pkg-config, one in C loads it, and Blender has the add-on. Lintian reads them
+# before. As root, with debootstrap and lintian: tests/packages.sh [FOLDER OF PACKAGES [TREE]]; the tree is made anew.
+set -euo pipefail
+root=$(cd "$(dirname "$0")/.." && pwd)
+packages=$(cd "${1:-$root/build/packages}" && pwd)
+tree=${2:-$root/build/packages_tree}
+[ "$(id -u)" -eq 0 ] || { echo "packages: chroot needs root" >&2; exit 1; }
+for tool in debootstrap lintian; do
+  command -v $tool >/dev/null || { echo "packages: install $tool first" >&2; exit 1; }
+done
+
+step() { printf '\n== %s\n' "$*"; }
+step lintian
+# Two exceptions: there is no bug number of an intent to package, and CPack writes scripts that call ldconfig, beside the
+# trigger that does the same.
+lintian --allow-root --fail-on error,warning --suppress-tags initial-upload-closes-no-bugs,maintscript-calls-ldconfig \
+  "$packages"/*.deb
+
+step "a bare tree"
+rm -rf --one-file-system "$tree"
+debootstrap --variant=minbase bookworm "$tree" > "$packages/debootstrap.log"
+cp -L /etc/resolv.conf /etc/hosts "$tree/etc/"
+printf '#!/bin/sh\nexit 101\n' > "$tree/usr/sbin/policy-rc.d"  # no service starts
+chmod +x "$tree/usr/sbin/policy-rc.d"
+cleanup() { umount "$tree/proc" "$tree/dev" 2>/dev/null || true; }
+trap cleanup EXIT
+mount -t proc proc "$tree/proc"
+mount --bind /dev "$tree/dev"
+mkdir "$tree/work"
+cp "$packages"/*.deb "$root/tests/plugin/c_host.c" "$tree/work/"
+cp -r "$root/reference_images/cornell_box" "$tree/work/"
+inside() { chroot "$tree" env HOME=/root DEBIAN_FRONTEND=noninteractive sh -euc "cd /work; $1"; }
+install() { inside "apt-get -qq install -y --no-install-recommends $*" > "$packages/apt.log" 2>&1 || { tail -20 "$packages/apt.log"; exit 1; }; }
+! inside "dpkg-query -W 'libtbb*' 'libembree*' 'libhwy*'" 2>/dev/null | grep . || { echo "packages: the tree is not bare" >&2; exit 1; }
+inside "apt-get -qq update"
+
+step "the command renders"
+install ./liblumicut1_*.deb ./lumicut_*.deb
+inside "lumicut render cornell_box/cornell_box.json --vpls 500 --size 48x36 -o box.exr -q && ls -l box.exr"
+inside "for page in '' -render -report; do test -s /usr/share/man/man1/lumicut\$page.1.gz || grep -q 'path-exclude.*man' /etc/dpkg/dpkg.cfg.d/*; done"
+inside "bash -c '. /usr/share/bash-completion/completions/lumicut
+  COMP_WORDS=(lumicut ren) COMP_CWORD=1; _lumicut; test \"\${COMPREPLY[*]}\" = render'"
+
+step "Python renders"
+install ./python3-lumicut_*.deb
+cat > "$tree/work/render_python.py" <<'P'
+import lumicut
+scene = lumicut.Scene(lumicut.Device())
+scene.set_materials([lumicut.Material(diffuse=(0.5, 0.5, 0.5))])
+scene.add_mesh([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], [[0, 1, 2]])
+scene.set_lights([lumicut.Light(type=lumicut.POINT, color=(1, 1, 1), value=9, position=(0, 0, 1))])
+scene.set_camera(lumicut.look_at((0, -3, 2), (0, 0, 0)))
+scene.commit()
+print("mean radiance", lumicut.render(scene, width=32, height=24, vpls=100).mean())
+P
+inside "python3 render_python.py"
+
+step "hosts find the library"
+install ./liblumicut-dev_*.deb gcc libc6-dev cmake make pkg-config
+cat > "$tree/work/host.c" <<'C'
+#include <lumicut/lumicut.h>
+#include <stdio.h>
+int main(void) {
+  puts(lumicut_version(NULL, NULL));
+  return 0;
+}
+C
+mkdir "$tree/work/project"
+cat > "$tree/work/project/CMakeLists.txt" <<'C'
+cmake_minimum_required(VERSION 3.22)
+project(host LANGUAGES C)
+find_package(lumicut 1.0 REQUIRED)
+add_executable(host ../host.c)
+target_link_libraries(host PRIVATE lumicut::lumicut)
+C
+inside "cmake -S project -B project/build > cmake.log && cmake --build project/build > build.log && project/build/host"
+# shellcheck disable=SC2016  # the shell inside expands it
+inside 'cc host.c -o host $(pkg-config --cflags --libs lumicut) && ./host'
+# shellcheck disable=SC2016
+inside 'cc -std=c99 c_host.c -o c_host $(pkg-config --cflags lumicut) -ldl -lm && ./c_host liblumicut.so.1 image && ls -l image.ppm'
+
+step "Blender has the add-on"
+install ./lumicut-blender_*.deb
+cat > "$tree/work/render.py" <<'P'
+import bpy
+from lumicut_blender import runtime
+assert runtime.require().origin == "system", runtime.failure()
+scene = bpy.context.scene
+scene.render.engine = "LUMICUT"
+scene.render.resolution_x, scene.render.resolution_y, scene.render.filepath = 48, 36, "/work/blender.png"
+bpy.ops.render.render(write_still=True)
+P
+inside "blender -b --factory-startup --addons lumicut_blender --python-exit-code 1 -P render.py > blender.log 2>&1 || { tail -20 blender.log; exit 1; }; ls -l blender.png"
+step "all passed"
