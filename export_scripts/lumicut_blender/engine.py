@@ -170,6 +170,7 @@ class LumicutEngine(bpy.types.RenderEngine):
 
     def _render_options(self, depsgraph, settings, groups, report):
         """What lumicut_render_desc has beside size, samples and tiles."""
+        self._denoised = False
         if self.is_preview:
             return {}
         if groups and not properties.tables.has(settings.integrator, library.LIGHT_GROUPS):
@@ -178,6 +179,9 @@ class LumicutEngine(bpy.types.RenderEngine):
         options = {name: getattr(settings, name) for name in properties.STOPS}
         layer = depsgraph.view_layer_eval
         options["flags"] = (library.ILLUMINANCE if layer.lumicut.use_pass_illuminance else 0) | (library.GROUPS if groups else 0)
+        self._denoised = settings.denoise and settings.passes != 1
+        if self._denoised or passes.wants_denoising(layer):
+            options["flags"] |= library.DENOISE | (0 if settings.firefly_filter else library.KEEP_FIREFLIES)
         passes.note_left_out(layer, report)
         if layer.lumicut.use_pass_error and settings.passes == 1:
             report.note(layer.name, "Error passes that are 0, as a single pass cannot tell")
@@ -269,7 +273,7 @@ class LumicutEngine(bpy.types.RenderEngine):
         result = self.begin_result(x0 - crop[0], crop[3] - y1, x1 - x0, y1 - y0, layer=depsgraph.view_layer_eval.name, view=view)
         try:
             found = result.layers[0].passes
-            filler = passes.Filler(render, depsgraph.scene_eval, camera, tile, *(self._backdrop or ()))
+            filler = passes.Filler(render, depsgraph.scene_eval, camera, tile, *(self._backdrop or ()), denoised=self._denoised)
             for name, source in [("Combined", "combined"), *chosen]:
                 target = found.get(name)
                 if target is not None and source is not None:

@@ -36,6 +36,47 @@ class LUMICUT_OT_preset(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class LUMICUT_OT_wire_denoiser(bpy.types.Operator):
+    """Renders what Open Image Denoise takes, and puts the compositor's Denoise node between the render layer and what it leads to"""
+    bl_idname = "lumicut.wire_denoiser"
+    bl_label = "Denoise in the Compositor"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return hasattr(context.scene, "node_tree")
+
+    def execute(self, context):
+        scene, layer = context.scene, context.view_layer
+        layer.lumicut.use_pass_denoising = True
+        scene.use_nodes = True
+        layer.update_render_passes()
+        tree = scene.node_tree
+        source = next((n for n in tree.nodes if n.type == "R_LAYERS" and n.scene in {None, scene} and n.layer == layer.name), None)
+        if source is None:
+            source = tree.nodes.new("CompositorNodeRLayers")
+            source.scene, source.layer = scene, layer.name
+        missing = [name for name in ("Noisy Image", "Denoising Normal", "Denoising Albedo") if name not in source.outputs]
+        if missing:
+            self.report({"ERROR"}, f"the render layer has no {', '.join(missing)}: is Lumicut the scene's engine?")
+            return {"CANCELLED"}
+        if any(link.to_node.type == "DENOISE" for link in source.outputs["Noisy Image"].links):
+            return {"FINISHED"}
+        node = tree.nodes.new("CompositorNodeDenoise")
+        node.location = source.location.x + 320, source.location.y
+        if hasattr(node, "prefilter"):
+            node.prefilter = "NONE"  # the guides are free of noise
+        targets = [link.to_socket for link in source.outputs["Image"].links]
+        if not targets:
+            composite = next((n for n in tree.nodes if n.type == "COMPOSITE"), None) or tree.nodes.new("CompositorNodeComposite")
+            targets = [composite.inputs["Image"]]
+        for target in targets:
+            tree.links.new(node.outputs["Image"], target)
+        for name, socket in (("Noisy Image", "Image"), ("Denoising Normal", "Normal"), ("Denoising Albedo", "Albedo")):
+            tree.links.new(source.outputs[name], node.inputs[socket])
+        return {"FINISHED"}
+
+
 class LUMICUT_OT_reload_library(bpy.types.Operator):
     """Looks for the library again, and draws the panels from what it offers"""
     bl_idname = "lumicut.reload_library"
@@ -132,6 +173,27 @@ class LUMICUT_PT_integrator(Panel, bpy.types.Panel):
         column = layout.column(align=True)
         for name in properties.STOPS:
             column.prop(settings, name)
+
+
+class LUMICUT_PT_denoise(Panel, bpy.types.Panel):
+    bl_label = "Denoise"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and bool(properties.tables.integrators)
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.lumicut, "denoise", text="")
+
+    def draw(self, context):
+        layout, settings = self.layout, context.scene.lumicut
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(settings, "firefly_filter")
+        layout.prop(settings, "denoise_viewport")
+        if settings.passes == 1:
+            layout.label(text="A frame of one pass is not denoised", icon="INFO")
+        layout.operator("lumicut.wire_denoiser")
 
 
 class LUMICUT_PT_lights(Panel, bpy.types.Panel):
@@ -232,6 +294,7 @@ class LUMICUT_PT_passes(Panel, bpy.types.Panel):
         column.prop(layer, "use_pass_normal")
         column.prop(layer, "use_pass_position")
         column.prop(layer.lumicut, "use_pass_albedo")
+        column.prop(layer.lumicut, "use_pass_denoising")
         column = layout.column(heading="Heat Maps", align=True)
         for prop in ("use_pass_cut_size", "use_pass_rays", "use_pass_bounds", "use_pass_error", "use_pass_illuminance"):
             column.prop(layer.lumicut, prop)
@@ -348,7 +411,7 @@ def menu(self, context):
     self.layout.operator(LUMICUT_OT_export.bl_idname, text="Lumicut scene (.json)")
 
 
-CLASSES = (LUMICUT_OT_preset, LUMICUT_OT_reload_library, LUMICUT_OT_export, LUMICUT_PT_integrator, LUMICUT_PT_lights,
+CLASSES = (LUMICUT_OT_preset, LUMICUT_OT_wire_denoiser, LUMICUT_OT_reload_library, LUMICUT_OT_export, LUMICUT_PT_integrator, LUMICUT_PT_denoise, LUMICUT_PT_lights,
            LUMICUT_PT_performance, LUMICUT_PT_statistics, LUMICUT_PT_notes, LUMICUT_PT_film, LUMICUT_PT_passes,
            LUMICUT_PT_light_groups, LUMICUT_PT_object_light_group, LUMICUT_PT_world_light_group,
            LUMICUT_PT_light, LUMICUT_PT_material_viewport)

@@ -40,6 +40,10 @@ def exposure(scene):
     return of_cycles(scene, "film_exposure", 1.0)
 
 
+def wants_denoising(layer):
+    return layer.lumicut.use_pass_denoising or of_cycles(layer, "denoising_store_passes", False)
+
+
 def wanted(layer):
     """[(pass name, letters of its channels, kind, what fills it)] of a view layer, beside Combined and light groups.
     What fills it is a channel of the library or a method of Filler."""
@@ -53,9 +57,9 @@ def wanted(layer):
     for channel, (name, prop, _, _, letters, kind) in properties.PASSES.items():
         if getattr(layer.lumicut, prop):
             chosen.append((name, letters, kind, channel))
-    if of_cycles(layer, "denoising_store_passes", False):
-        chosen += [("Noisy Image", "RGBA", "COLOR", "combined"), ("Denoising Normal", "XYZ", "VECTOR", "camera_normal"),
-                   ("Denoising Albedo", "RGB", "COLOR", "albedo"), ("Denoising Depth", "Z", "VALUE", "ray_length")]
+    if wants_denoising(layer):
+        chosen += [("Noisy Image", "RGBA", "COLOR", "noisy"), ("Denoising Normal", "XYZ", "VECTOR", "camera_normal"),
+                   ("Denoising Albedo", "RGB", "COLOR", "denoising_albedo"), ("Denoising Depth", "Z", "VALUE", "ray_length")]
     return chosen
 
 
@@ -107,12 +111,13 @@ def check_compositor(scene, layer):
 
 class Filler:
     """Pixels of one rectangle of a render. `camera`: a library.Camera. `backdrop(camera, tile)`: what it alone sees of the
-    world, which is in the light group of number `group`."""
+    world, which is in the light group of number `group`. `denoised`: Combined and Error are."""
 
-    def __init__(self, render, scene, camera, tile, backdrop=None, group=0):
+    def __init__(self, render, scene, camera, tile, backdrop=None, group=0, denoised=False):
         self.render, self.scene, self.camera, self.tile = render, scene, camera, tile
         self._read, self._exposure, self._backdrop = {}, exposure(scene), backdrop
-        self._with_backdrop = {"radiance", f"radiance.{group}"} if backdrop is not None else set()
+        self._with_backdrop = {"radiance", "denoised", "denoising_color", f"radiance.{group}"} if backdrop is not None else set()
+        self._denoised = denoised
         self.hit = self.channel("alpha") > 0
 
     def channel(self, name):
@@ -122,7 +127,7 @@ class Filler:
 
     def fill(self, source):
         own = getattr(self, source, None)
-        return own() if own is not None else self.lit(source) if source.startswith("radiance") or source == "error" \
+        return own() if own is not None else self.lit(source) if source.startswith("radiance") \
             else self.channel(source)
 
     def lit(self, channel):
@@ -132,7 +137,16 @@ class Filler:
         return pixels if self._exposure == 1 else pixels * np.float32(self._exposure)
 
     def combined(self):
-        radiance = self.lit("radiance")
+        return self._image("denoised" if self._denoised else "radiance")
+
+    def noisy(self):
+        return self._image("denoising_color")
+
+    def error(self):
+        return self.lit("denoised_error" if self._denoised else "error")
+
+    def _image(self, channel):
+        radiance = self.lit(channel)
         out = np.ones(radiance.shape[:2] + (4,), np.float32)
         out[..., :3] = radiance
         if self.scene.render.film_transparent:
@@ -167,4 +181,4 @@ class Filler:
     def camera_normal(self):
         """Of Cycles' denoiser: right, up, and away from the viewer."""
         axes = np.array(self.camera.to_world, np.float32).reshape(3, 4)[:, :3]
-        return self.channel("normal") @ (axes * np.array((1, 1, -1), np.float32))
+        return self.channel("denoising_normal") @ (axes * np.array((1, 1, -1), np.float32))

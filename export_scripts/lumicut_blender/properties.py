@@ -125,7 +125,8 @@ _classes = []
 
 
 class LumicutViewLayerSettings(bpy.types.PropertyGroup):
-    __annotations__ = {prop: BoolProperty(name=label, description=text) for _, prop, label, text, _, _ in PASSES.values()}
+    __annotations__ = {prop: BoolProperty(name=label, description=text) for _, prop, label, text, _, _ in PASSES.values()} | {
+        "use_pass_denoising": BoolProperty(name="Denoising Data", description="What a denoiser takes: the image with fireflies spread (Noisy Image), albedo, normal and depth of what is seen, in mirrors and through glass too")}
 
 
 def parameters_of(settings, integrator=None):
@@ -141,7 +142,7 @@ def common_parameters_of(settings, integrator):
 
 def apply_preset(settings, name):
     _, _, own, wanted = PRESETS[name]
-    for key in STOPS:
+    for key in (*STOPS, "denoise", "firefly_filter"):
         settings.property_unset(key)
     for key, value in own.items():
         setattr(settings, key, value)
@@ -172,6 +173,12 @@ def register():
                                       default=0.0, min=0.0, max=1.0, precision=3, step=1),
         "confidence": FloatProperty(name="Confidence", description="Of the interval of the pass Error and of Target Error",
                                     default=0.95, min=0.5, max=0.999, precision=3, step=1),
+        "denoise": BoolProperty(name="Denoise", description="From two passes on: take away the noise of compensation, gloss and glass, by what the passes tell of it. The light of virtual lights stays as it is",
+                                default=True),
+        "firefly_filter": BoolProperty(name="Spread Fireflies", description="What is bright in a single pass is spread over its surroundings, so that it is no dot. No light is lost",
+                                       default=True),
+        "denoise_viewport": BoolProperty(name="Viewport", description="The viewport's last picture is the mean of four passes, denoised: for scenes that compensate, and for the path tracer",
+                                         default=False),
         "accel": EnumProperty(name="Tree for Rays", description="What finds the triangles that rays hit", items=ACCELS, default="bvh"),
         "builder": EnumProperty(name="Tree Builder", description="How the library's own tree is made", items=BUILDERS, default="DEFAULT"),
         "robust": BoolProperty(name="Watertight Rays", description="No ray slips between two triangles that share an edge; without it, tracing is a little faster",

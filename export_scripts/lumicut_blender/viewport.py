@@ -20,6 +20,7 @@ from .report import Report
 
 # (pixels of the view a pixel of the picture, quality that the library suggests an integrator for or None for the scene's own)
 LEVELS = ((8, "interactive"), (3, "preview"), (1, None))
+DENOISED_PASSES = 4
 _sessions = weakref.WeakSet()
 TICK = 0.05
 
@@ -79,7 +80,7 @@ class Session:
             if "vpls" in values:
                 values["vpls"] = str(settings.viewport_lights)
             levels.append((divisor, name, values))
-        return {"levels": levels, "exposure": passes.exposure(settings.id_data), "tracing": properties.tracing_of(settings), "threads": settings.threads}
+        return {"levels": levels, "denoise": settings.denoise_viewport, "exposure": passes.exposure(settings.id_data), "tracing": properties.tracing_of(settings), "threads": settings.threads}
 
     def draw(self, engine, context, depsgraph):
         region = context.region
@@ -204,9 +205,11 @@ class Session:
                 integrators[key] = integrator
             width, height = max(1, size[0] // divisor), max(1, size[1] // divisor)
             self.message = f"{width} x {height}"
-            with library.Render(integrators[key], scene, width, height) as render:
+            denoise = settings["denoise"] and divisor == 1
+            options = {"passes": DENOISED_PASSES, "flags": library.DENOISE} if denoise else {}
+            with library.Render(integrators[key], scene, width, height, **options) as render:
                 self._guarded(render, lambda: render.wait(library.FOREVER))
-                radiance, alpha = render.read("radiance"), render.read("alpha")
+                radiance, alpha = render.read("denoised" if denoise else "radiance"), render.read("alpha")
             picture = np.ones((height, width, 4), np.float32)
             if data.backdrop is not None:
                 radiance = radiance + (1 - alpha) * data.backdrop.seen(camera, width, height, (0, 0, width, height))

@@ -168,11 +168,11 @@ def add_light(kind, location=(0, 0, 2), energy=100.0, rotation=(0, 0, 0), scale=
     return ob
 
 
-def set_lumicut(integrator="exhaustive", samples=1, passes=1, **parameters):
+def set_lumicut(integrator="exhaustive", samples=1, passes=1, denoise=False, **parameters):
     scene = bpy.context.scene
     scene.render.engine = "LUMICUT"
     settings = scene.lumicut
-    settings.integrator, settings.samples, settings.passes = integrator, samples, passes
+    settings.integrator, settings.samples, settings.passes, settings.denoise = integrator, samples, passes, denoise
     for name, value in parameters.items():
         group = settings.common if hasattr(settings.common, name) else getattr(settings, integrator)
         setattr(group, name, value)

@@ -175,6 +175,56 @@ class Views(unittest.TestCase):
                 self.assertLess(difference.mean(), 0.05)
 
 
+class Denoising(unittest.TestCase):
+    def setUp(self):
+        self.scene = h.new_scene(60, 40)
+        self.layer = self.scene.view_layers[0]
+        h.set_world((0.1, 0.15, 0.2))
+        h.add_plane(6, -0.5, h.diffuse())
+        h.add_sphere(0.8, (0.2, 0.1, 0.4), h.diffuse((0.9, 0.1, 0.1)))
+        h.add_light("SUN", energy=2, rotation=(0.3, 0.4, 0), angle=0.0)
+        self.scene.camera.rotation_euler = (0.4, 0, 0)
+        self.scene.camera.location = (0, -2.5, 5)
+        self.layer.lumicut.use_pass_denoising = True
+        self.layer.lumicut.use_pass_error = True
+
+    def rendered(self, **options):
+        with h.quiet():
+            h.set_lumicut("path_tracer", passes=8, **options)
+            self.scene.lumicut.path_tracer.samples = 1
+            return h.render()
+
+    def test_it_takes_away_noise_and_can_be_turned_off(self):
+        plain, denoised = self.rendered(), self.rendered(denoise=True)
+        with h.quiet():
+            self.scene.lumicut.path_tracer.samples = 256
+            truth = h.render()
+
+        def wrong(image):
+            return np.sqrt(((image["Combined"] - truth["Combined"])[..., :3] ** 2).mean())
+        self.assertLess(wrong(denoised), 0.75 * wrong(plain))  # edges keep theirs, and the picture is small
+        np.testing.assert_array_equal(plain["Noisy Image"], denoised["Noisy Image"])
+        self.assertTrue((denoised["Lumicut Error"] != plain["Lumicut Error"]).any())
+        # A single pass tells nothing.
+        with h.quiet():
+            h.set_lumicut("path_tracer", denoise=True)
+            image = h.render()
+        np.testing.assert_array_equal(image["Noisy Image"], image["Combined"])
+
+    def test_one_button_wires_the_compositors_node(self):
+        self.layer.lumicut.use_pass_denoising = False
+        h.set_lumicut("path_tracer", passes=2)
+        for _ in range(2):  # once is enough, and twice no harm
+            self.assertEqual(bpy.ops.lumicut.wire_denoiser(), {"FINISHED"})
+        nodes = [n for n in self.scene.node_tree.nodes if n.type == "DENOISE"]
+        self.assertEqual(len(nodes), 1)
+        wired = {socket.name: socket.links[0].from_socket.name for socket in nodes[0].inputs if socket.links}
+        self.assertEqual(wired, {"Image": "Noisy Image", "Normal": "Denoising Normal", "Albedo": "Denoising Albedo"})
+        self.assertIn("COMPOSITE", [link.to_node.type for link in nodes[0].outputs["Image"].links])
+        with h.quiet():
+            h.render()  # no pass is missing
+
+
 class Backdrops(unittest.TestCase):
     """Worlds that the camera sees otherwise than what they light with."""
 
