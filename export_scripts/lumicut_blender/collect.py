@@ -7,7 +7,7 @@ each set of materials; its instances are transforms.
 import bpy
 import numpy as np
 
-from . import lights, mesh_attributes, soft_spots, worlds
+from . import lights, mesh_attributes, soft_spots, strands, worlds
 from .lumicut import library
 from .cameras import rows
 from .materials import Materials
@@ -15,9 +15,7 @@ from .report import Report
 from .scene_data import Mesh, SceneData, flattened, is_flat
 
 AS_MESH = {"CURVE", "FONT", "META", "SURFACE"}  # a MESH item follows for each
-LEFT_OUT = {"VOLUME": "Volumes left out", "CURVES": "Hair and curve objects left out",
-            "POINTCLOUD": "Point clouds left out", "GPENCIL": "Grease pencil left out",
-            "GREASEPENCIL": "Grease pencil left out"}
+LEFT_OUT = {"VOLUME": "Volumes left out", "GPENCIL": "Grease pencil left out", "GREASEPENCIL": "Grease pencil left out"}
 
 
 class Cancelled(Exception):
@@ -228,14 +226,20 @@ class Collector:
         for count, instance in enumerate(self.depsgraph.object_instances):
             if count % 64 == 0:
                 self.check()
-            if not instance.show_self:
-                self._check_particles(instance)
-                continue
             ob = instance.object
+            if instance.show_particles and layer.use_strand and ob.type == "MESH":
+                self._add_hair(instance, ob, override)
+            if not instance.show_self:
+                continue
             if ob.type == "MESH":
-                self._check_particles(instance)
                 if layer.use_solid:
                     self._add_mesh(instance, ob, override)
+            elif ob.type == "CURVES":
+                if layer.use_strand:
+                    self._add_curves(instance, ob, override)
+            elif ob.type == "POINTCLOUD":
+                if layer.use_solid:
+                    self._add_points(instance, ob, override)
             elif ob.type == "LIGHT":
                 light = lights.convert_light(ob.name, ob.data, instance.matrix_world, self.materials.images, self.report,
                                              self.profiles)
@@ -285,29 +289,18 @@ class Collector:
     def _group(self, owner):
         return self.groups.get(getattr(owner, "lightgroup", ""), 0)
 
-    def _check_particles(self, instance):
-        if instance.is_instance:
-            return
-        ob = instance.object
-        for system in ob.particle_systems:
-            settings = system.settings
-            if settings.type == "HAIR" and settings.render_type == "PATH":
-                self.report.note(f"{ob.name}: {system.name}", "Hair left out")
-            elif settings.render_type in {"HALO", "LINE"}:
-                self.report.note(f"{ob.name}: {system.name}", "Particles without an object left out")
-
-    def _add_mesh(self, instance, ob, override):
-        mesh = ob.data
+    def _slots(self, ob, override):
         if override is not None:
-            slots = [override]
-        else:
-            slots = [slot.material for slot in ob.material_slots] or [None]
+            return [override]
+        return [slot.material for slot in ob.material_slots] or [None]
+
+    def _variants(self, ob, slots, pane):
+        """(materials by slot, mask): one for each set of materials that some kinds of rays see alike."""
         held_out = ob.is_holdout or ob.holdout_get(view_layer=self.depsgraph.view_layer_eval)  # its own, or its collection's
-        of_slots = [self.materials.numbers(material, lambda: self._is_pane(mesh, instance.matrix_world)) for material in slots]
+        of_slots = [self.materials.numbers(material, pane) for material in slots]
         if ob.as_pointer() not in self._looked_at:
             self._looked_at.add(ob.as_pointer())
             self._check_flags(ob)
-        # A mesh for each set of materials that some kinds of rays see alike.
         masks = {}
         hidden = self._hidden_from(ob)
         for (ray, bit), numbers in zip(library.RAYS.items(), zip(*of_slots)):
@@ -315,8 +308,93 @@ class Collector:
                 numbers = tuple(self.materials.held_out(n) for n in numbers)
             if ray not in hidden:
                 masks[numbers] = masks.get(numbers, 0) | bit
-        for numbers, mask in masks.items():
-            self._add_variant(instance, ob, mesh, slots, numbers, 0 if mask == library.ALL_RAYS else mask)
+        return [(numbers, 0 if mask == library.ALL_RAYS else mask) for numbers, mask in masks.items()]
+
+    def _add_mesh(self, instance, ob, override):
+        mesh = ob.data
+        slots = self._slots(ob, override)
+        for numbers, mask in self._variants(ob, slots, lambda: self._is_pane(mesh, instance.matrix_world)):
+            self._add_variant(instance, ob, mesh, slots, numbers, mask)
+
+    def _add_hair(self, instance, ob, override):
+        for system in ob.particle_systems:
+            settings = system.settings
+            if settings.render_type in {"HALO", "LINE"}:
+                self.report.note(f"{ob.name}: {system.name}", "Particles without an object left out")
+            if settings.type != "HAIR" or settings.render_type != "PATH":
+                continue
+            slots = self._slots(ob, override)
+            slot = slots[min(settings.material, len(slots)) - 1]
+
+            def shape(system=system):
+                places, radii, numbers = strands.hair_of_particles(ob, system, self.depsgraph.mode == "VIEWPORT", self.check)
+                places, radii = strands.straightened(places, radii)
+                return [(*strands.tubes(places, radii), self._root_uvs(ob, system, numbers, places.shape[1]))]
+
+            self._add_shapes(instance, ob, slot, ("hair", ob.as_pointer(), system.name), f"{ob.name}: {system.name}", shape)
+
+    def _root_uvs(self, ob, system, numbers, keys):
+        """Texture coordinates where each hair grows, for all of its vertices; None without any."""
+        modifier = next((m for m in ob.modifiers if m.type == "PARTICLE_SYSTEM" and m.particle_system.name == system.name), None)
+        if modifier is None or not ob.data.uv_layers:
+            return None
+        parents = len(system.particles)
+        uvs = np.empty((len(numbers), 2), np.float32)
+        for i, number in enumerate(numbers.tolist()):
+            if i % 1024 == 0:
+                self.check()
+            particle = system.particles[number] if number < parents else system.particles[0]
+            uvs[i] = system.uv_on_emitter(modifier, particle=particle, particle_no=number, uv_no=0)
+        return np.repeat(uvs, keys * strands.SIDES, axis=0)
+
+    def _add_curves(self, instance, ob, override):
+        def shape():
+            return [(*strands.tubes(places, radii), None) for places, radii in strands.curve_strands(ob.data)]
+
+        self._add_shapes(instance, ob, self._slots(ob, override)[0], ("curves", ob.data.as_pointer()), ob.name, shape)
+
+    def _add_shapes(self, instance, ob, material, key, name, shape):
+        """Meshes that are made here, once for all instances: `shape` gives [(positions, normals, indices, uvs)]."""
+        for numbers, mask in self._variants(ob, [material], lambda: False):
+            number = numbers[0]
+            group = self._group(ob) if any(self.materials.converted[number].values.emission) else 0
+            if self.materials.converted[number].is_hole():
+                continue
+            if (key, 0, number, group, mask) not in self._meshes:
+                self.check()
+                textured = bool(self.materials.converted[number].plain_pictures())
+                for part, (positions, normals, indices, uvs) in enumerate(shape()):
+                    self._meshes[key, part, number, group, mask] = Mesh(
+                        name, positions, indices, normals, uvs if textured else None, None, number, [], group, mask)
+            part = 0
+            while (key, part, number, group, mask) in self._meshes:
+                target = self._meshes[key, part, number, group, mask]
+                if len(target.indices):
+                    target.transforms.append(rows(instance.matrix_world))
+                    self.instances += 1
+                part += 1
+
+    def _add_points(self, instance, ob, override):
+        cloud = ob.data
+        count = len(cloud.points)
+        places = strands.read(cloud.attributes["position"].data, "vector", count, 3)
+        radius = cloud.attributes.get("radius")
+        radii = strands.read(radius.data, "value", count) if radius is not None else np.full(count, 0.01, np.float32)
+        matrix = np.array(instance.matrix_world)
+        for numbers, mask in self._variants(ob, [self._slots(ob, override)[0]], lambda: False):
+            number = numbers[0]
+            if self.materials.converted[number].is_hole():
+                continue
+            group = self._group(ob) if any(self.materials.converted[number].values.emission) else 0
+            key = "sphere", number, group, mask
+            if key not in self._meshes:
+                positions, indices = strands.unit_sphere()
+                self._meshes[key] = Mesh("spheres of points", positions, indices, positions, None, None, number, [], group, mask)
+            self.check()
+            for transform in strands.spheres(places, radii):
+                local = np.vstack([np.reshape(transform, (3, 4)), (0, 0, 0, 1)])
+                self._meshes[key].transforms.append((matrix @ local)[:3].ravel().tolist())
+                self.instances += 1
 
     def _add_variant(self, instance, ob, mesh, slots, numbers, mask):
         """`numbers`: materials by slot; `mask`: of the rays that see them."""

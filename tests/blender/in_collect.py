@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 import helpers as h
-from lumicut_blender import collect, materials, report
+from lumicut_blender import collect, materials, report, strands
 from lumicut_blender.lumicut import library
 
 
@@ -193,15 +193,58 @@ class Geometry(unittest.TestCase):
         self.assertNotIn("Gone", text)
         self.assertEqual(h.last_stats()["scene"]["instances"], 2)  # of Broken and Flat: a point has nothing to show
 
-    def test_hair_volumes_and_motion_blur_are_reported_by_name(self):
+    def test_hair_grows_from_root_to_tip_at_its_thickness(self):
         plane = h.add_plane(name="Meadow")
         plane.modifiers.new("grass", "PARTICLE_SYSTEM")
-        plane.particle_systems[0].settings.type = "HAIR"
+        settings = plane.particle_systems[0].settings
+        settings.type, settings.count, settings.hair_length = "HAIR", 50, 1.0
+        settings.root_radius, settings.tip_radius, settings.radius_scale, settings.use_close_tip = 1.0, 0.5, 0.04, False
+        plane.location, plane.scale = (1, 2, 3), (2, 2, 2)
+        data, notes = collected()
+        hair = next(mesh for mesh in data.meshes if mesh.name.startswith("Meadow: "))
+        low, high = hair.positions.min(0), hair.positions.max(0)
+        self.assertGreater(high[2], 0.4)  # twice as long in the world
+        self.assertAlmostEqual(low[2], 0, delta=0.03)
+        self.assertEqual(len(hair.transforms), 1)
+        keys = len(hair.positions) // 50 // 3
+        rings = hair.positions.reshape(50, keys, 3, 3)
+        radii = np.linalg.norm(rings - rings.mean(2, keepdims=True), axis=3).mean((0, 2))
+        np.testing.assert_allclose(radii[[0, -1]], np.array([0.02, 0.01]) * np.pi / (3 * np.sin(np.pi / 3)), rtol=1e-3)
+        self.assertFalse([note for note in notes if "Hair" in note])
+
+    def test_volumes_and_motion_blur_are_reported_by_name(self):
         h.link(bpy.data.objects.new("Smoke", bpy.data.volumes.new("Smoke")))
         bpy.context.scene.render.use_motion_blur = True
         text = "\n".join(collected()[1])
-        for words in ("Hair left out: Meadow", "Volumes left out: Smoke", "Motion blur left out"):
+        for words in ("Volumes left out: Smoke", "Motion blur left out"):
             self.assertIn(words, text)
+
+
+class Strands(unittest.TestCase):
+    """Shapes made of arrays alone."""
+
+    def test_tubes_have_the_area_of_round_ones_from_the_average_side(self):
+        rng = np.random.default_rng(1)
+        places = np.stack([np.zeros(3), rng.normal(size=3)])[None]
+        positions, _, indices = strands.tubes(places, np.array([0.01, 0.01]))
+        a, b, c = (positions[indices[:, k]].astype(float) for k in range(3))
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+        # A convex body's mean projection is a quarter of its surface. [Cauchy]
+        self.assertAlmostEqual(area / (2 * np.pi * 0.01 * np.linalg.norm(places[0, 1])), 1, delta=1e-4)
+
+    def test_straight_strands_keep_their_ends_alone_and_bent_ones_their_bends(self):
+        line = np.linspace(0, 1, 9)[None, :, None] * np.array([1.0, 2, 3])
+        places, radii = strands.straightened(line, np.linspace(0.02, 0.01, 9))
+        self.assertEqual(places.shape, (1, 2, 3))
+        np.testing.assert_allclose(radii, [0.02, 0.01])
+        bent = line.copy()
+        bent[0, 4:, 0] = bent[0, 4, 0]
+        self.assertEqual(strands.straightened(bent, np.full(9, 0.01))[0].shape, (1, 3, 3))
+
+    def test_spheres_have_the_volume_of_balls(self):
+        positions, indices = strands.unit_sphere()
+        a, b, c = (positions[indices[:, k]].astype(float) for k in range(3))
+        self.assertAlmostEqual((a * np.cross(b, c)).sum() / 6 / (4 / 3 * np.pi), 1, delta=1e-5)
 
 
 class MaterialTrees(unittest.TestCase):
