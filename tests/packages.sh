@@ -38,7 +38,7 @@ inside "apt-get -qq update"
 
 step "the command renders"
 install ./liblumicut1_*.deb ./lumicut_*.deb
-inside "lumicut render cornell_box/cornell_box.json --vpls 500 --size 48x36 -o box.exr -q && ls -l box.exr"
+inside "lumicut render cornell_box/cornell_box.json --vpls 500 --size 48x36 -o box.exr --png box.png -q && ls -l box.exr box.png"
 inside "for page in '' -render -report; do test -s /usr/share/man/man1/lumicut\$page.1.gz || grep -q 'path-exclude.*man' /etc/dpkg/dpkg.cfg.d/*; done"
 inside "bash -c '. /usr/share/bash-completion/completions/lumicut
   COMP_WORDS=(lumicut ren) COMP_CWORD=1; _lumicut; test \"\${COMPREPLY[*]}\" = render'"

@@ -228,7 +228,7 @@ def older(archive, path):
             if name.endswith("blender_manifest.toml"):
                 content, count = re.subn(rb'^version = "[\d.]+"', b'version = "0.9.0"', content, flags=re.M)
                 assert count == 1
-            if name.endswith("__init__.py"):
+            if name == "lumicut_blender/__init__.py":
                 content, count = re.subn(rb'"version": \([\d, ]+\)', b'"version": (0, 9, 0)', content)
                 assert count == 1
             out.writestr(name, content)
