@@ -28,9 +28,7 @@ class ProgramReader {
       : attribute_(attribute), image_(image) {}
 
   Program read(const JsonValue& value) {
-    JsonObject object(value);
-    for (const auto& element : object.need("instructions").elements()) instruction(element);
-    object.finish();
+    for (const auto& element : value.elements()) instruction(element);
     return std::move(program_);
   }
 

@@ -8,7 +8,7 @@
 
 namespace lumicut::io {
 
-// `attribute`: number of an attribute's name; `image`: 1 + index of an image that an instruction names.
+// `value`: the list of its steps. `attribute`: number of an attribute's name; `image`: 1 + index of an image that an instruction names.
 Program read_program(const JsonValue& value, const std::function<uint32_t(const std::string&)>& attribute,
                      const std::function<int32_t(const JsonValue&)>& image);
 

@@ -289,7 +289,7 @@ float musgrave_noise(const Vec4f& p, NoiseKind kind, const NoiseOptions& o) {
         const float signal = (noise() + o.offset) * power;
         value += weight * signal, weight *= o.gain * signal;
       }
-      if (rest == 0.0f) return value;
+      if (rest == 0.0f || !(weight > 0.001f)) return value;
       return value + rest * std::min(weight, 1.0f) * ((noise() + o.offset) * power);
     }
     default: {

@@ -414,8 +414,15 @@ Vec3f projected(uint32_t mode, const Vec3f& v) {
   }
 }
 
+// Beyond its borders a clipped image has black texels, which the filter mixes in within half a texel.
 Rgb looked_up(const Texture& image, uint32_t mode, float u, float v) {
-  if ((mode & 1u) != 0 && !(u >= 0.0f && u <= 1.0f && v >= 0.0f && v <= 1.0f)) return {};
+  if ((mode & 1u) != 0) {
+    if (image.nearest()) return u >= 0.0f && u <= 1.0f && v >= 0.0f && v <= 1.0f ? image.color(u, v) : Rgb{};
+    const auto inside = [](float x, uint32_t texels) {
+      return std::clamp(std::min(x, 1.0f - x) * static_cast<float>(texels) + 0.5f, 0.0f, 1.0f);
+    };
+    return image.color(u, v) * (inside(u, image.width()) * inside(v, image.height()));
+  }
   if ((mode & 2u) != 0) {
     const auto folded = [](float x) {
       const float t = x - 2.0f * std::floor(0.5f * x);

@@ -30,6 +30,11 @@ class Lattice {
   Vec4f point(const Vec4f& offset) const {
     return offset + hash_place(cell_ + offset, options_.dimensions) * options_.randomness;
   }
+  // What lies in its dimensions.
+  Vec4f within(const Vec4f& p) const {
+    const int n = options_.dimensions;
+    return {p.x, n > 1 ? p.y : 0.0f, n > 2 ? p.z : 0.0f, n > 3 ? p.w : 0.0f};
+  }
   Rgb color(const Vec4f& offset) const { return hash_color(cell_ + offset, options_.dimensions); }
 
   // All offsets within `reach` cells, the first coordinate fastest.
@@ -103,7 +108,7 @@ VoronoiCell smooth(const Lattice& lattice, float smoothness) {
     sum.color = sum.color + (color - sum.color) * h - Rgb{correction, correction, correction};
     sum.position = sum.position + (point - sum.position) * h - Vec4f{correction, correction, correction, correction};
   });
-  sum.position = sum.position + lattice.cell();
+  sum.position = lattice.within(sum.position) + lattice.cell();
   return sum;
 }
 

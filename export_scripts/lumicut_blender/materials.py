@@ -15,7 +15,7 @@ from .lumicut import library
 from .images import Images, Picture, image_of
 from .mappings import Mapping, aligned
 from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Value, input_of
-from .programs import NORMAL, CannotCompile, Compiler, ProgramPicture, of_picture
+from .programs import NORMAL, CannotCompile, Compiler, ProgramPicture, of_picture, program_of
 
 HOLE = 1e-3  # an opacity that the library takes as "not there"; 0 means 1 to it
 LARGEST_FACTOR = 1e6  # of a texture, in the library
@@ -273,12 +273,12 @@ class SurfaceReader(Evaluator):
         """A program that gives the normal; `socket`: or an expression."""
         try:
             expr = self.compiler.socket(socket, stack) if hasattr(socket, "is_linked") else socket
+            found = program_of(self.owner, expr)
         except CannotCompile as what:
             self.note(str(what), "Normal and bump maps left out")
             return
         if expr is NORMAL or expr.constant():
             return
-        found = ProgramPicture(self.owner, expr)
         if self.normals is None and self.heights is None:
             self.normals = found, 1.0
         elif self.normals is None or self.normals[0].key != found.key:

@@ -241,6 +241,7 @@ class Evaluator:
         """A program; where there is none, as if there were no programs."""
         try:
             expr = self.compiler.socket(socket, stack)
+            picture = None if expr.constant() else programs.program_of(self.owner, expr)
         except CannotCompile as what:
             self.note(str(what), "Nodes taken as a constant colour")
             self.programs = False
@@ -252,9 +253,7 @@ class Evaluator:
                     self.report = before
             finally:
                 self.programs = True
-        if expr.constant():
-            return Value(expr.mean)
-        return Value(1, ProgramPicture(self.owner, expr))
+        return Value(expr.mean) if picture is None else Value(1, picture)
 
     def plain_or_program(self):
         """Called where an approximation follows: leaves it to a program where there may be one."""
@@ -336,7 +335,13 @@ class Evaluator:
         else:
             self.note(name, "Textures taken as their mean")
             return Value(fn(*(v.mean() for v in values)))
-        return Value(expr.mean) if expr.constant() else Value(1, ProgramPicture(self.owner, expr))
+        if expr.constant():
+            return Value(expr.mean)
+        try:
+            return Value(1, programs.program_of(self.owner, expr))
+        except CannotCompile as what:
+            self.note(str(what), "Textures taken as their mean")
+            return Value(expr.mean)
 
     @staticmethod
     def expr_of(value):

@@ -29,7 +29,8 @@ FRACTALS = {"FBM": 0, "MULTIFRACTAL": 1, "HYBRID_MULTIFRACTAL": 2, "RIDGED_MULTI
 TABLE = 256  # steps of curves and ramps, as Cycles has them
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
-MOST_INSTRUCTIONS = 1024
+MOST_INSTRUCTIONS = 1024  # of the library
+DEEPEST = 150  # nodes in a row: Python's own stack ends some way beyond
 
 
 class NeedsProgram(Exception):
@@ -44,6 +45,9 @@ def whole(x):
     return np.broadcast_to(np.asarray(x, float), (3,))
 
 
+_keys = {}  # numbers of what expressions are, so that telling two apart takes no walk through them
+
+
 class Expr:
     """`data`: what an operation reads: an attribute (a tuple that names it), a Picture or table numbers.
     `mean`: about its mean, for decisions that need one number."""
@@ -53,7 +57,8 @@ class Expr:
         self.op, self.mode, self.inputs, self.data = op, mode, tuple(inputs), data
         self.mean = np.nan_to_num(np.array(whole(mean if value is None else value), float))
         kept = data if not isinstance(data, Picture) else ("picture", data.key)
-        self.key = (op, mode, tuple(i.key for i in self.inputs), kept) if op else ("constant", tuple(self.mean.tolist()))
+        what = (op, mode, tuple(i.key for i in self.inputs), kept) if op else ("constant", tuple(self.mean.tolist()))
+        self.key = _keys.setdefault(what, len(_keys))
 
     def constant(self):
         return self.op is None
@@ -182,6 +187,29 @@ def of_picture(picture):
     return image(picture, base)
 
 
+def in_order(expr):
+    """Each that it is made of but the constants, once, after its inputs."""
+    found, entered, stack = {}, set(), [expr]
+    while stack:
+        top = stack[-1]
+        if top.constant() or top.key in found:
+            stack.pop()
+        elif top.key in entered:
+            found[top.key] = top
+            stack.pop()
+        else:
+            entered.add(top.key)
+            stack.extend(reversed(top.inputs))
+    return list(found.values())
+
+
+def program_of(name, expr):
+    """Raises CannotCompile for one that is too long."""
+    if len(in_order(expr)) > MOST_INSTRUCTIONS:
+        raise CannotCompile(f"Trees of more than {MOST_INSTRUCTIONS} operations")
+    return ProgramPicture(name, expr)
+
+
 class ProgramPicture:
     """A program where a Picture may stand: its texels are not known."""
     flags = 0
@@ -204,19 +232,7 @@ class ProgramPicture:
 
     def attributes(self):
         """What its meshes must bring."""
-        found, seen = [], set()
-
-        def visit(expr):
-            if expr.key in seen:
-                return
-            seen.add(expr.key)
-            for i in expr.inputs:
-                visit(i)
-            if isinstance(expr.data, tuple) and expr.data and isinstance(expr.data[0], str):
-                found.append(expr.data)
-
-        visit(self.expr)
-        return found
+        return [e.data for e in in_order(self.expr) if isinstance(e.data, tuple) and e.data and isinstance(e.data[0], str)]
 
     def compiled(self, picture_number, attribute_number):
         """scene_data.Program: numbers of images and attributes come from the functions."""
@@ -226,11 +242,9 @@ class ProgramPicture:
         def operand(expr):
             if expr.constant():
                 return -1 - constants.setdefault(tuple(expr.mean.tolist()), len(constants))
-            return emit(expr)
+            return places[expr.key]
 
         def emit(expr):
-            if expr.key in places:
-                return places[expr.key]
             row = np.zeros(12, np.int32)
             row[0], row[1] = OP[expr.op], expr.mode
             for k, i in enumerate(expr.inputs):
@@ -246,12 +260,11 @@ class ProgramPicture:
                 row[10], row[11] = tables[expr.data], len(expr.data)
             rows.append(row)
             places[expr.key] = len(rows) - 1
-            return places[expr.key]
 
-        if self.expr.constant():
+        for expr in in_order(self.expr):
+            emit(expr)
+        if not rows:
             emit(Expr("vector", VECTOR["ADD"], (self.expr, ZERO, ZERO)))
-        else:
-            emit(self.expr)
         values = np.array(list(constants), np.float32).reshape(-1, 3)
         return Program(self.name, np.array(rows, np.int32), values, np.array(table, np.float32))
 
@@ -304,8 +317,8 @@ class Compiler:
                 raise CannotCompile(node.bl_label or node.type)
             self.depth += 1
             try:
-                if self.depth > 200:
-                    raise CannotCompile("Trees deeper than 200 nodes")
+                if self.depth > DEEPEST:
+                    raise CannotCompile(f"Trees deeper than {DEEPEST} nodes")
                 self.known[key] = handler(node, output, stack)
             finally:
                 self.depth -= 1
@@ -719,7 +732,7 @@ class Compiler:
 
     def _vect_transform(self, node, output, stack):
         value = self.get(node, stack, "Vector")
-        mode = {"POINT": 0, "VECTOR": 1, "NORMAL": 2}[node.vector_type]
+        mode = 0 if node.vector_type == "POINT" else 1  # Cycles turns normals as vectors
         spaces = node.convert_from, node.convert_to
         if "CAMERA" in spaces:
             raise CannotCompile("Vector Transform of the camera")
@@ -727,4 +740,4 @@ class Compiler:
             return value
         name = "world_to_object" if spaces[0] == "WORLD" else "object_to_world"
         moved = Expr("transform", mode, (value,), (name,), mean=0)
-        return normalize(moved) if mode == 2 else moved
+        return normalize(moved) if node.vector_type == "NORMAL" else moved

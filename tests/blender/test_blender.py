@@ -25,7 +25,7 @@ LIBRARY = None if ZIP else BUILD / "lib/liblumicut.so"
 PATIENCE = 900  # seconds until a hanging Blender is killed: not a measure of anything
 
 BATCHES = {
-    "units": ["in_light_units", "in_materials", "in_images"],
+    "units": ["in_light_units", "in_materials", "in_images", "in_programs"],
     "scenes": ["in_addon", "in_cancel", "in_collect", "in_export", "in_frames", "in_objects", "in_views"],
 }
 
