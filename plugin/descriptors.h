@@ -27,6 +27,8 @@ constexpr bool fields_fill(const FieldSpan (&fields)[N], size_t size) {
 #define F(field) \
   FieldSpan { offsetof(S, field), sizeof(S::field) }
 
+// NOLINTBEGIN(bugprone-sizeof-expression): the sizes of the pointers are meant
+
 LUMICUT_DESCRIPTOR(lumicut_device_desc, F(struct_size), F(abi_major), F(threads), F(verbosity), F(log), F(user));
 LUMICUT_DESCRIPTOR(lumicut_status, F(struct_size), F(state), F(phase), F(fraction), F(seconds), F(tiles_done),
                    F(tiles_total), F(passes_done), F(passes_total), F(error));
@@ -66,6 +68,7 @@ LUMICUT_DESCRIPTOR(lumicut_render_desc, F(struct_size), F(width), F(height), F(s
 LUMICUT_DESCRIPTOR(lumicut_tile, F(struct_size), F(x0), F(y0), F(x1), F(y1));
 LUMICUT_DESCRIPTOR(lumicut_channel_info, F(struct_size), F(components), F(name), F(description));
 
+// NOLINTEND(bugprone-sizeof-expression)
 #undef F
 #undef LUMICUT_DESCRIPTOR
 

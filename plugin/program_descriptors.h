@@ -6,6 +6,7 @@
 
 namespace lumicut {
 
+// NOLINTBEGIN(bugprone-sizeof-expression): the sizes of the pointers are meant
 template <>
 struct Descriptor<lumicut_program> {
   using S = lumicut_program;
@@ -29,6 +30,7 @@ struct Descriptor<lumicut_attribute> {
                                          {offsetof(S, domain), sizeof(S::domain)},
                                          {offsetof(S, values), sizeof(S::values)}};
 };
+// NOLINTEND(bugprone-sizeof-expression)
 
 static_assert(sizeof(lumicut_program) == 40 && sizeof(lumicut_attribute) == 24 && sizeof(lumicut_instruction) == 48);
 
