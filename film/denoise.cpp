@@ -24,7 +24,7 @@ constexpr float kVisibleDot = 0.5f;
 
 // Levels are weighted by estimates of their error, so those that chance made small count most, and the mean is too small.
 // By so much, as test_denoise and the scenes in docs/progressive.md measure it.
-constexpr double kOfChoice = 2.0;
+constexpr double kOfChoice = 1.5;
 
 // Planes that are filtered: both halves' common part, and what fireflies bring to the mean.
 enum Filtered : size_t { kOdd = 0, kEven = 3, kRare = 6 };

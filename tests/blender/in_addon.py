@@ -140,7 +140,7 @@ class Tables(unittest.TestCase):
         settings.max_seconds, settings.target_error, settings.confidence = 5, 0.1, 0.9
         bpy.ops.lumicut.preset(preset="reference")
         self.assertTrue(settings.common.compensate and settings.passes > 1)
-        bpy.ops.lumicut.preset(preset="good")
+        bpy.ops.lumicut.preset(preset="draft")
         self.assertFalse(settings.common.compensate)
         self.assertEqual((settings.passes, settings.max_seconds, settings.target_error), (1, 0, 0))
 
