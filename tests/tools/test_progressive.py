@@ -37,6 +37,17 @@ class Progressive(Compared):
         self.assertEqual(self.difference(broken, whole)["rmse"], 0)
         self.assertEqual(self.difference(broken, whole, "--layer", "error")["rmse"], 0)
 
+    def test_denoising_writes_its_layers_and_changes_no_other(self):
+        plain, denoised, named = (self.folder / name for name in ("plain.exr", "denoised.exr", "named.exr"))
+        render = ["render", SCENE, "--passes", "4", "-p", "compensate=true", *SMALL]
+        self.assert_ends(lumicut(*render, "-o", plain), OK)
+        self.assert_ends(lumicut(*render, "--denoise", "-o", denoised), OK)
+        self.assert_ends(lumicut(*render, "--layers", "denoised", "-o", named), OK)
+        self.assertEqual(self.difference(denoised, plain)["rmse"], 0)
+        self.assertGreater(self.difference(denoised, plain, "--layer", "denoised", "--reference-layer", "radiance")["rmse"], 0)
+        self.assertEqual(self.difference(named, denoised, "--layer", "denoised")["rmse"], 0)
+        self.assertGreater(self.difference(denoised, plain, "--layer", "denoising_albedo", "--reference-layer", "radiance")["rmse"], 0)
+
     def test_a_stopped_render_keeps_its_passes(self):
         kept = self.folder / "render.checkpoint"
         process = subprocess.Popen([COMMAND, "render", SCENE, "--passes", "100000", *SMALL, "--checkpoint", kept, "-o",
