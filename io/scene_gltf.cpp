@@ -1,0 +1,624 @@
+#include "io/scene_gltf.h"
+
+#include <fmt/format.h>
+#include <tiny_gltf.h>
+#include <unistd.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <numbers>
+
+#include "io/file_error.h"
+#include "io/sky.h"
+#include "io/texture_store.h"
+
+namespace lumicut::io {
+
+namespace {
+
+namespace gltf = tinygltf;
+namespace fs = std::filesystem;
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kLumensPerWatt = 683;  // as other exporters take it: candela, lux and nits over this
+constexpr size_t kMostNodes = 1 << 24;  // placed, each time a node is reached by one of its parents
+constexpr int kDeepest = 256;
+
+using Vec = std::array<double, 3>;
+
+Vec operator+(const Vec& a, const Vec& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+Vec operator*(const Vec& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
+double dot(const Vec& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vec cross(const Vec& a, const Vec& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+Vec unit(const Vec& v) {
+  const double length = std::sqrt(dot(v, v));
+  return length > 0 ? v * (1 / length) : Vec{0, 0, 1};
+}
+
+// Three rows of four.
+struct Matrix {
+  std::array<double, 12> m{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+
+  Vec column(size_t c) const { return {m[c], m[4 + c], m[8 + c]}; }
+  Vec point(const Vec& p) const { return column(0) * p[0] + column(1) * p[1] + column(2) * p[2] + column(3); }
+  double determinant() const { return dot(column(0), cross(column(1), column(2))); }
+};
+
+Matrix operator*(const Matrix& a, const Matrix& b) {
+  Matrix out;
+  for (size_t r = 0; r < 3; ++r)
+    for (size_t c = 0; c < 4; ++c) {
+      double sum = c == 3 ? a.m[4 * r + 3] : 0;
+      for (size_t k = 0; k < 3; ++k) sum += a.m[4 * r + k] * b.m[4 * k + c];
+      out.m[4 * r + c] = sum;
+    }
+  return out;
+}
+
+Matrix placed(const Vec& move, const std::array<double, 4>& q, const Vec& scale) {
+  const auto [x, y, z, w] = q;
+  Matrix out;
+  out.m = {1 - 2 * (y * y + z * z), 2 * (x * y - z * w),     2 * (x * z + y * w),     move[0],
+           2 * (x * y + z * w),     1 - 2 * (x * x + z * z), 2 * (y * z - x * w),     move[1],
+           2 * (x * z - y * w),     2 * (y * z + x * w),     1 - 2 * (x * x + y * y), move[2]};
+  for (size_t r = 0; r < 3; ++r)
+    for (size_t c = 0; c < 3; ++c) out.m[4 * r + c] *= scale[c];
+  return out;
+}
+
+// Images of the file, one file each, for the reader of pictures.
+class Folder {
+ public:
+  Folder() {
+    std::string name = (fs::temp_directory_path() / "lumicut-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr)
+      throw FileError(name, "cannot be made: images of glTF files are unpacked there");
+    path_ = name;
+  }
+  ~Folder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+class Reader {
+ public:
+  explicit Reader(const std::string& path) : path_(path), textures_(scene_.textures) {}
+
+  SceneData read() {
+    check_regular_file(path_);
+    gltf::TinyGLTF loader;
+    // As they are in the file: they are read by what they are used for.
+    loader.SetImageLoader(
+        [](gltf::Image* image, int, std::string*, std::string*, int, int, const unsigned char* bytes, int size, void*) {
+          image->image.assign(bytes, bytes + size);
+          return true;
+        },
+        nullptr);
+    std::string error, warning;
+    const bool binary = path_.size() > 3 && std::string(path_.end() - 3, path_.end()) != "ltf";
+    const bool done = binary ? loader.LoadBinaryFromFile(&model_, &error, &warning, path_)
+                             : loader.LoadASCIIFromFile(&model_, &error, &warning, path_);
+    if (!done) throw FileError(path_, error.empty() ? "is no glTF 2.0 file" : one_line(error));
+    if (!warning.empty()) scene_.warnings.add("warnings of the glTF reader", path_, one_line(warning));
+    note_extensions();
+    for (size_t m = 0; m < model_.materials.size(); ++m) read_material(m);
+    Material plain;
+    plain.name = "no material";
+    plain.values = default_material();
+    scene_.materials.push_back(plain);
+    read_nodes();
+    if (scene_.meshes.empty()) throw FileError(path_, "has no triangles: there is nothing to see");
+    if (!has_camera_) frame();
+    if (!lit()) add_sky();
+    scene_.file = path_;
+    return std::move(scene_);
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& where, const std::string& text) const {
+    throw FileError(path_, fmt::format("{}: {}", where, text));
+  }
+  static std::string one_line(std::string text) {
+    while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
+    for (char& c : text)
+      if (c == '\n') c = ' ';
+    return text;
+  }
+  template <typename List>
+  auto& at(const List& list, int index, const std::string& where) const {
+    if (index < 0 || static_cast<size_t>(index) >= list.size())
+      fail(where, fmt::format("names number {}, but there are {}", index, list.size()));
+    return list[static_cast<size_t>(index)];
+  }
+
+  void note_extensions() {
+    static const std::set<std::string> kRead = {"KHR_lights_punctual",        "KHR_materials_emissive_strength",
+                                                "KHR_materials_transmission", "KHR_materials_ior",
+                                                "KHR_materials_clearcoat",    "KHR_materials_specular",
+                                                "KHR_texture_transform",      "EXT_mesh_gpu_instancing"};
+    for (const auto& name : model_.extensionsRequired)
+      if (kRead.count(name) == 0) fail("extensionsRequired", fmt::format("{} is not supported", name));
+    for (const auto& name : model_.extensionsUsed)
+      if (kRead.count(name) == 0) leave_out(name);
+    if (!model_.animations.empty()) leave_out("animations");
+    if (!model_.skins.empty()) leave_out("skins");
+  }
+  void leave_out(const std::string& what) {
+    scene_.warnings.add("things left out", path_, fmt::format("{}: left out", what));
+  }
+
+  // ---- Numbers of accessors
+
+  // `width` numbers an element, integers of normalized accessors as shares of 1.
+  std::vector<double> numbers(int index, int width, const std::string& where) const {
+    const auto& accessor = at(model_.accessors, index, where);
+    const std::string name = fmt::format("accessors[{}]", index);
+    if (gltf::GetNumComponentsInType(static_cast<uint32_t>(accessor.type)) != width)
+      fail(name, fmt::format("has another type than {} numbers an element, which {} needs", width, where));
+    if (accessor.sparse.isSparse) fail(name, "is sparse, which is not supported");
+    const int bytes = gltf::GetComponentSizeInBytes(static_cast<uint32_t>(accessor.componentType));
+    std::vector<double> out(accessor.count * static_cast<size_t>(width));
+    if (accessor.bufferView < 0 || out.empty()) return out;  // all 0
+    const auto& view = at(model_.bufferViews, accessor.bufferView, name);
+    const auto& buffer = at(model_.buffers, view.buffer, fmt::format("bufferViews[{}]", accessor.bufferView));
+    const int stride = accessor.ByteStride(view);
+    const size_t start = view.byteOffset + accessor.byteOffset, element = static_cast<size_t>(bytes * width);
+    if (bytes <= 0 || stride < static_cast<int>(element) || start > buffer.data.size() ||
+        accessor.count - 1 > (buffer.data.size() - start) / static_cast<size_t>(stride) ||
+        (accessor.count - 1) * static_cast<size_t>(stride) + element > buffer.data.size() - start)
+      fail(name, fmt::format("its {} elements do not lie in buffers[{}] of {} bytes", accessor.count, view.buffer,
+                             buffer.data.size()));
+    for (size_t i = 0; i < accessor.count; ++i)
+      for (int k = 0; k < width; ++k) {
+        const unsigned char* at =
+            &buffer.data[start + i * static_cast<size_t>(stride) + static_cast<size_t>(k * bytes)];
+        out[i * static_cast<size_t>(width) + static_cast<size_t>(k)] =
+            number(at, accessor.componentType, accessor.normalized);
+      }
+    return out;
+  }
+  static double number(const unsigned char* at, int type, bool normalized) {
+    const auto as = [&]<typename T>(T value, double most) {
+      std::memcpy(&value, at, sizeof(value));
+      return normalized ? std::max(static_cast<double>(value) / most, -1.0) : static_cast<double>(value);
+    };
+    switch (type) {
+      case TINYGLTF_COMPONENT_TYPE_BYTE:
+        return as(int8_t{}, 127);
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+        return as(uint8_t{}, 255);
+      case TINYGLTF_COMPONENT_TYPE_SHORT:
+        return as(int16_t{}, 32767);
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+        return as(uint16_t{}, 65535);
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+        return as(uint32_t{}, 4294967295.0);
+      case TINYGLTF_COMPONENT_TYPE_DOUBLE:
+        return as(double{}, 1);
+      default:
+        return as(float{}, 1);
+    }
+  }
+
+  // ---- Values of extensions
+
+  static const gltf::Value* extension(const gltf::ExtensionMap& all, const char* name) {
+    const auto found = all.find(name);
+    return found == all.end() ? nullptr : &found->second;
+  }
+  static double number_of(const gltf::Value* from, const char* key, double missing) {
+    if (from == nullptr || !from->Has(key) || !from->Get(key).IsNumber()) return missing;
+    return from->Get(key).GetNumberAsDouble();
+  }
+  static Vec vector_of(const gltf::Value* from, const char* key, const Vec& missing) {
+    if (from == nullptr || !from->Has(key) || !from->Get(key).IsArray()) return missing;
+    Vec out = missing;
+    const auto& list = from->Get(key);
+    for (size_t k = 0; k < 3 && k < list.ArrayLen(); ++k)
+      if (list.Get(static_cast<int>(k)).IsNumber()) out[k] = list.Get(static_cast<int>(k)).GetNumberAsDouble();
+    return out;
+  }
+  float share(double value, const std::string& where, double most = 1) const {
+    if (!(value >= 0 && value <= most)) fail(where, fmt::format("{} is not in [0, {}]", value, most));
+    return static_cast<float>(value);
+  }
+
+  // ---- Textures
+
+  uint32_t flags_of(int sampler) const {
+    if (sampler < 0) return 0;
+    const auto& s = at(model_.samplers, sampler, "textures");
+    uint32_t flags = 0;
+    if (s.wrapS == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE && s.wrapT == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE)
+      flags |= LUMICUT_CLAMP;
+    if (s.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST) flags |= LUMICUT_NEAREST;
+    return flags;
+  }
+  std::string image_file(int texture, const std::string& user) {
+    const int source = at(model_.textures, texture, user).source;
+    const auto& image = at(model_.images, source, user);
+    if (image.image.empty()) fail(user, fmt::format("images[{}] ({}) is not there", source, image.uri));
+    const bool jpeg = image.image.size() > 1 && image.image[0] == 0xff && image.image[1] == 0xd8;
+    const fs::path file = folder_.path() / fmt::format("image{}.{}", source, jpeg ? "jpg" : "png");
+    if (!fs::exists(file)) {
+      std::ofstream out(file, std::ios::binary);
+      out.write(reinterpret_cast<const char*>(image.image.data()), static_cast<std::streamsize>(image.image.size()));
+      if (!out.flush()) throw FileError(file.string(), "cannot be written");
+    }
+    return file.string();
+  }
+  int32_t texture(int index, TextureUse use, const std::string& user) {
+    if (index < 0) return 0;
+    const uint32_t flags = flags_of(at(model_.textures, index, user).sampler);
+    return textures_.get(image_file(index, user), use, flags, user);
+  }
+  // One channel of an image as a texture of its own.
+  int32_t channel_of(int index, size_t channel, const std::string& user) {
+    if (index < 0) return 0;
+    const auto key = std::pair(index, channel);
+    if (const auto found = channels_.find(key); found != channels_.end()) return found->second;
+    const Texture& all = scene_.textures[static_cast<size_t>(texture(index, TextureUse::vectors, user)) - 1];
+    Texture one;
+    one.file = all.file, one.width = all.width, one.height = all.height, one.channels = 1;
+    one.flags = all.flags & ~uint32_t{LUMICUT_SRGB};
+    for (size_t i = channel; i < all.bytes.size(); i += all.channels) one.bytes.push_back(all.bytes[i]);
+    for (size_t i = channel; i < all.floats.size(); i += all.channels) one.floats.push_back(all.floats[i]);
+    scene_.textures.push_back(std::move(one));
+    return channels_[key] = static_cast<int32_t>(scene_.textures.size());
+  }
+
+  // ---- Materials
+
+  void read_material(size_t index) {
+    const gltf::Material& from = model_.materials[index];
+    Material out;
+    out.name = from.name.empty() ? fmt::format("materials[{}]", index) : from.name;
+    const std::string where = fmt::format("materials[{}]", index);
+    lumicut_material& m = out.values = default_material();
+    m.flags = LUMICUT_GGX;
+    const auto& pbr = from.pbrMetallicRoughness;
+    if (pbr.baseColorFactor.size() != 4 || from.emissiveFactor.size() != 3)
+      fail(where, "a factor has another number of values");
+    for (size_t k = 0; k < 3; ++k) m.diffuse[k] = share(pbr.baseColorFactor[k], where + ".baseColorFactor");
+    m.diffuse_texture = texture(pbr.baseColorTexture.index, TextureUse::colour, where);
+    m.roughness = share(pbr.roughnessFactor, where + ".roughnessFactor");
+    m.metallic = share(pbr.metallicFactor, where + ".metallicFactor");
+    if (pbr.metallicRoughnessTexture.index >= 0) {
+      m.roughness_texture = channel_of(pbr.metallicRoughnessTexture.index, 1, where);
+      m.metallic_texture = channel_of(pbr.metallicRoughnessTexture.index, 2, where);
+    }
+    const auto* specular = extension(from.extensions, "KHR_materials_specular");
+    const Vec tint = vector_of(specular, "specularColorFactor", {1, 1, 1});
+    for (size_t k = 0; k < 3; ++k)
+      m.specular[k] = share(std::min(1.0, number_of(specular, "specularFactor", 1) * tint[k]), where + ".specular");
+    const double ior = number_of(extension(from.extensions, "KHR_materials_ior"), "ior", 1.5);
+    if (!(ior >= 1 && ior <= 10)) fail(where + ".ior", fmt::format("{} is not in [1, 10]", ior));
+    m.ior = static_cast<float>(ior);
+    m.transmission = share(number_of(extension(from.extensions, "KHR_materials_transmission"), "transmissionFactor", 0),
+                           where + ".transmissionFactor");
+    if (m.transmission > 0) m.flags |= LUMICUT_SHADOWS_PASS;  // without KHR_materials_volume it is a thin sheet
+    const auto* coat = extension(from.extensions, "KHR_materials_clearcoat");
+    m.coat = share(number_of(coat, "clearcoatFactor", 0), where + ".clearcoatFactor");
+    m.coat_roughness = share(number_of(coat, "clearcoatRoughnessFactor", 0), where + ".clearcoatRoughnessFactor");
+    const double strength =
+        number_of(extension(from.extensions, "KHR_materials_emissive_strength"), "emissiveStrength", 1);
+    for (size_t k = 0; k < 3; ++k)
+      m.emission[k] = share(from.emissiveFactor[k] * strength, where + ".emissiveFactor", 1e15);
+    m.emission_texture = texture(from.emissiveTexture.index, TextureUse::colour, where);
+    if (from.doubleSided) m.flags |= LUMICUT_EMIT_BOTH_SIDES;
+    if (from.normalTexture.index >= 0) {
+      m.normal_texture = texture(from.normalTexture.index, TextureUse::vectors, where);
+      m.normal_strength = share(from.normalTexture.scale, where + ".normalTexture.scale", 10);
+    }
+    if (from.alphaMode != "OPAQUE") read_alpha(from, m, where);
+    scene_.materials.push_back(std::move(out));
+  }
+  void read_alpha(const gltf::Material& from, lumicut_material& m, const std::string& where) {
+    const auto& pbr = from.pbrMetallicRoughness;
+    const bool mask = from.alphaMode == "MASK";
+    const double factor = share(pbr.baseColorFactor[3], where + ".baseColorFactor");
+    if (pbr.baseColorTexture.index < 0) {
+      m.opacity = mask ? (factor >= from.alphaCutoff ? 1 : kHole) : std::max(kHole, static_cast<float>(factor));
+      return;
+    }
+    m.opacity = mask ? 1 : std::max(kHole, static_cast<float>(factor));
+    m.opacity_texture = texture(pbr.baseColorTexture.index, TextureUse::mask, where);
+    if (!mask) return;
+    Texture cut = scene_.textures[static_cast<size_t>(m.opacity_texture) - 1];
+    for (uint8_t& b : cut.bytes) b = b / 255.0 * factor >= from.alphaCutoff ? 255 : 0;
+    for (float& f : cut.floats) f = f * factor >= from.alphaCutoff ? 1 : 0;
+    scene_.textures.push_back(std::move(cut));
+    m.opacity_texture = static_cast<int32_t>(scene_.textures.size());
+  }
+
+  // ---- Meshes
+
+  void read_primitive(const gltf::Primitive& from, const std::string& where, Mesh& out) {
+    if (from.mode != TINYGLTF_MODE_TRIANGLES && from.mode != TINYGLTF_MODE_TRIANGLE_STRIP &&
+        from.mode != TINYGLTF_MODE_TRIANGLE_FAN) {
+      leave_out(where + ": points or lines");
+      return;
+    }
+    const auto attribute = [&](const std::string& name) {
+      const auto found = from.attributes.find(name);
+      return found == from.attributes.end() ? -1 : found->second;
+    };
+    if (attribute("POSITION") < 0) return;
+    if (attribute("COLOR_0") >= 0) leave_out(where + ": colours of vertices");
+    if (!from.targets.empty()) leave_out(where + ": morph targets");
+    const auto add = [&](std::vector<float>& to, const std::vector<double>& values) {
+      for (const double v : values) to.push_back(static_cast<float>(v));
+    };
+    add(out.positions, numbers(attribute("POSITION"), 3, where + ".POSITION"));
+    const size_t vertices = out.positions.size() / 3;
+    if (attribute("NORMAL") >= 0) add(out.normals, numbers(attribute("NORMAL"), 3, where + ".NORMAL"));
+    const int material = from.material;
+    int set = 0;
+    const gltf::Value* transform = nullptr;
+    if (material >= 0) {
+      const auto& texture = at(model_.materials, material, where).pbrMetallicRoughness.baseColorTexture;
+      set = texture.texCoord;
+      transform = extension(texture.extensions, "KHR_texture_transform");
+      set = static_cast<int>(number_of(transform, "texCoord", set));
+    }
+    if (attribute(fmt::format("TEXCOORD_{}", set)) >= 0) {
+      const auto uvs = numbers(attribute(fmt::format("TEXCOORD_{}", set)), 2, where + ".TEXCOORD");
+      const Vec move = vector_of(transform, "offset", {0, 0, 0}), scale = vector_of(transform, "scale", {1, 1, 1});
+      const double angle = number_of(transform, "rotation", 0), c = std::cos(angle), s = std::sin(angle);
+      for (size_t i = 0; i + 1 < uvs.size(); i += 2) {
+        const double u = uvs[i] * scale[0], v = uvs[i + 1] * scale[1];
+        out.uvs.push_back(static_cast<float>(c * u + s * v + move[0]));
+        out.uvs.push_back(static_cast<float>(1 - (c * v - s * u + move[1])));  // v counts from the top there
+      }
+    }
+    if ((!out.normals.empty() && out.normals.size() != 3 * vertices) ||
+        (!out.uvs.empty() && out.uvs.size() != 2 * vertices))
+      fail(where, "its attributes have different numbers of elements");
+    std::vector<uint32_t> order;
+    if (from.indices >= 0) {
+      for (const double i : numbers(from.indices, 1, where + ".indices")) {
+        if (!(i < static_cast<double>(vertices))) fail(where, fmt::format("index {} is not below {}", i, vertices));
+        order.push_back(static_cast<uint32_t>(i));
+      }
+    } else {
+      for (uint32_t i = 0; i < vertices; ++i) order.push_back(i);
+    }
+    const auto triangle = [&](uint32_t a, uint32_t b, uint32_t c) { out.indices.insert(out.indices.end(), {a, b, c}); };
+    for (size_t i = 0; i + 2 < order.size(); i += from.mode == TINYGLTF_MODE_TRIANGLES ? 3 : 1) {
+      const bool odd = i % 2 != 0;
+      if (from.mode == TINYGLTF_MODE_TRIANGLES)
+        triangle(order[i], order[i + 1], order[i + 2]);
+      else if (from.mode == TINYGLTF_MODE_TRIANGLE_FAN)
+        triangle(order[0], order[i + 1], order[i + 2]);
+      else
+        triangle(order[i], order[i + (odd ? 2 : 1)], order[i + (odd ? 1 : 2)]);
+    }
+    const auto number = static_cast<uint32_t>(material >= 0 ? static_cast<size_t>(material) : model_.materials.size());
+    out.materials.assign(out.indices.size() / 3, number);
+  }
+
+  // ---- Nodes
+
+  void read_nodes() {
+    // Those of a mesh that is placed often are stored once.
+    for (size_t m = 0; m < model_.meshes.size(); ++m) {
+      first_.push_back(scene_.meshes.size());
+      for (size_t p = 0; p < model_.meshes[m].primitives.size(); ++p) {
+        Mesh mesh;
+        mesh.name = model_.meshes[m].name;
+        read_primitive(model_.meshes[m].primitives[p], fmt::format("meshes[{}].primitives[{}]", m, p), mesh);
+        scene_.meshes.push_back(std::move(mesh));
+      }
+    }
+    first_.push_back(scene_.meshes.size());
+    std::vector<int> roots;
+    if (!model_.scenes.empty()) {
+      roots = at(model_.scenes, std::max(0, model_.defaultScene), "scene").nodes;
+    } else {
+      for (size_t n = 0; n < model_.nodes.size(); ++n) roots.push_back(static_cast<int>(n));
+    }
+    for (const int root : roots) read_node(root, {}, 0);
+    std::erase_if(scene_.meshes, [](const Mesh& mesh) { return mesh.indices.empty() || mesh.transforms.empty(); });
+  }
+  void read_node(int index, const Matrix& parent, int depth) {
+    const std::string where = fmt::format("nodes[{}]", index);
+    if (depth > kDeepest || ++placed_nodes_ > kMostNodes) fail(where, "nodes lie in each other without end");
+    const gltf::Node& node = at(model_.nodes, index, where);
+    Matrix local;
+    if (node.matrix.size() == 16) {
+      for (size_t r = 0; r < 3; ++r)
+        for (size_t c = 0; c < 4; ++c) local.m[4 * r + c] = node.matrix[4 * c + r];
+    } else {
+      const auto& t = node.translation;
+      const auto& q = node.rotation;
+      const auto& s = node.scale;
+      local = placed(t.size() == 3 ? Vec{t[0], t[1], t[2]} : Vec{0, 0, 0},
+                     q.size() == 4 ? std::array{q[0], q[1], q[2], q[3]} : std::array{0.0, 0.0, 0.0, 1.0},
+                     s.size() == 3 ? Vec{s[0], s[1], s[2]} : Vec{1, 1, 1});
+    }
+    const Matrix world = parent * local;
+    for (const double v : world.m)
+      if (!(std::abs(v) < kLargestCoordinate)) fail(where, fmt::format("its transform has the number {}", v));
+    if (node.mesh >= 0) place(node, world, where);
+    if (node.camera >= 0 && !has_camera_) read_camera(node.camera, world, where);
+    if (const auto* light = extension(node.extensions, "KHR_lights_punctual"))
+      read_light(static_cast<int>(number_of(light, "light", -1)), world, where);
+    for (const int child : node.children) read_node(child, world, depth + 1);
+  }
+  void place(const gltf::Node& node, const Matrix& world, const std::string& where) {
+    at(model_.meshes, node.mesh, where);
+    std::vector<Matrix> places{world};
+    if (const auto* instancing = extension(node.extensions, "EXT_mesh_gpu_instancing");
+        instancing && instancing->Has("attributes")) {
+      const auto& attributes = instancing->Get("attributes");
+      const auto read = [&](const char* name, int width) {
+        const auto accessor = static_cast<int>(number_of(&attributes, name, -1));
+        return accessor < 0 ? std::vector<double>{} : numbers(accessor, width, where + "." + name);
+      };
+      const auto t = read("TRANSLATION", 3), q = read("ROTATION", 4), s = read("SCALE", 3);
+      const size_t count = std::max({t.size() / 3, q.size() / 4, s.size() / 3});
+      for (const size_t n : {t.size() / 3, q.size() / 4, s.size() / 3})
+        if (n != 0 && n != count) fail(where, "its instances have different numbers of attributes");
+      places.clear();
+      for (size_t i = 0; i < count; ++i)
+        places.push_back(world * placed(t.empty() ? Vec{0, 0, 0} : Vec{t[3 * i], t[3 * i + 1], t[3 * i + 2]},
+                                        q.empty() ? std::array{0.0, 0.0, 0.0, 1.0}
+                                                  : std::array{q[4 * i], q[4 * i + 1], q[4 * i + 2], q[4 * i + 3]},
+                                        s.empty() ? Vec{1, 1, 1} : Vec{s[3 * i], s[3 * i + 1], s[3 * i + 2]}));
+    }
+    for (const Matrix& place : places) {
+      if (!(std::abs(place.determinant()) > 0)) {
+        leave_out(where + ": what is scaled to nothing");
+        continue;
+      }
+      for (size_t m = first_[static_cast<size_t>(node.mesh)]; m < first_[static_cast<size_t>(node.mesh) + 1]; ++m)
+        for (const double v : place.m) scene_.meshes[m].transforms.push_back(static_cast<float>(v));
+    }
+  }
+
+  // ---- Camera and lights
+
+  void set_camera(const Vec& eye, const Vec& back, const Vec& up) {
+    lumicut_camera& camera = scene_.camera;
+    camera.struct_size = sizeof(camera);
+    const Vec z = unit(back), x = unit(cross(up, z)), y = cross(z, x);
+    for (size_t r = 0; r < 3; ++r) {
+      const double row[4] = {x[r], y[r], z[r], eye[r]};
+      for (size_t c = 0; c < 4; ++c) camera.to_world[4 * r + c] = static_cast<float>(row[c]);
+    }
+    has_camera_ = true;
+  }
+  void read_camera(int index, const Matrix& world, const std::string& where) {
+    const auto& from = at(model_.cameras, index, where);
+    set_camera(world.column(3), world.column(2), world.column(1));
+    lumicut_camera& camera = scene_.camera;
+    if (from.type == "orthographic") {
+      camera.orthographic = 1;
+      if (!(from.orthographic.ymag > 0)) fail(fmt::format("cameras[{}].ymag", index), "is not above 0");
+      camera.height = static_cast<float>(2 * from.orthographic.ymag);
+    } else {
+      const double fov = from.perspective.yfov;
+      if (!(fov > 1e-3 && fov < kPi - 1e-3)) fail(fmt::format("cameras[{}].yfov", index), fmt::format("is {}", fov));
+      camera.fov_y = static_cast<float>(fov);
+      const double aspect = from.perspective.aspectRatio;
+      if (aspect > 0.05 && aspect < 20) scene_.width = static_cast<uint32_t>(std::lround(scene_.height * aspect));
+    }
+  }
+  // From the front and above, at a distance at which the ball around the scene fits.
+  void frame() {
+    Vec low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
+    for (const Mesh& mesh : scene_.meshes)
+      for (size_t t = 0; t < mesh.transforms.size(); t += 12) {
+        Matrix m;
+        for (size_t k = 0; k < 12; ++k) m.m[k] = mesh.transforms[t + k];
+        for (size_t p = 0; p < mesh.positions.size(); p += 3) {
+          const Vec q = m.point({mesh.positions[p], mesh.positions[p + 1], mesh.positions[p + 2]});
+          for (size_t k = 0; k < 3; ++k) low[k] = std::min(low[k], q[k]), high[k] = std::max(high[k], q[k]);
+        }
+      }
+    const Vec middle = (low + high) * 0.5, half = (high + low * -1.0) * 0.5;
+    const double radius = std::max(std::sqrt(dot(half, half)), 1e-6), fov = 0.7;
+    const Vec towards = unit({0.5, 0.4, 1});
+    set_camera(middle + towards * (1.05 * radius / std::sin(fov / 2)), towards, {0, 1, 0});
+    scene_.camera.fov_y = static_cast<float>(fov);
+  }
+  void read_light(int index, const Matrix& world, const std::string& where) {
+    const gltf::Light& from = at(model_.lights, index, where);
+    lumicut_light light{};
+    light.struct_size = sizeof(light);
+    light.unit = LUMICUT_RADIOMETRIC;
+    for (size_t k = 0; k < 3; ++k)
+      light.color[k] = from.color.size() == 3 ? share(from.color[k], where + ".color", 1e6) : 1;
+    light.value = share(from.intensity / kLumensPerWatt, where + ".intensity", 1e15);
+    const Vec position = world.column(3), direction = unit(world.column(2)) * -1.0;
+    for (size_t k = 0; k < 3; ++k)
+      light.position[k] = static_cast<float>(position[k]), light.direction[k] = static_cast<float>(direction[k]);
+    if (from.type == "point") {
+      light.type = LUMICUT_POINT;
+    } else if (from.type == "directional") {
+      light.type = LUMICUT_SUN;
+      for (float& p : light.position) p = 0;
+    } else if (from.type == "spot") {
+      light.type = LUMICUT_SPOT;
+      const double outer = from.spot.outerConeAngle, inner = from.spot.innerConeAngle;
+      if (!(outer > 0 && outer <= kPi / 2 && inner >= 0 && inner <= outer))
+        fail(fmt::format("lights[{}].spot", index), fmt::format("its angles are {} and {}", inner, outer));
+      light.angle = static_cast<float>(2 * outer);
+      light.blend = static_cast<float>(1 - inner / outer);
+    } else {
+      fail(fmt::format("lights[{}].type", index), fmt::format("\"{}\" is none of point, spot, directional", from.type));
+    }
+    scene_.lights.push_back(light);
+    scene_.light_names.push_back(where);
+  }
+  bool lit() const {
+    if (!scene_.lights.empty()) return true;
+    for (const Mesh& mesh : scene_.meshes)
+      for (const uint32_t material : mesh.materials) {
+        const auto& e = scene_.materials[material].values.emission;
+        if (e[0] + e[1] + e[2] > 0) return true;
+      }
+    return false;
+  }
+  void add_sky() {
+    Sky sky;
+    sky.sun_elevation = 50, sky.sun_azimuth = -60;
+    Texture map;
+    map.file = "sky";
+    map.width = 512, map.height = 256, map.channels = 3;
+    map.floats = sky.map(map.height, {0.2, 0.2, 0.2}, true);
+    scene_.textures.push_back(std::move(map));
+    lumicut_environment environment{};
+    environment.struct_size = sizeof(environment);
+    for (float& c : environment.color) c = 1;
+    environment.texture = static_cast<int32_t>(scene_.textures.size());
+    const float up[9] = {1, 0, 0, 0, 0, -1, 0, 1, 0};  // y is up in glTF, z in the map
+    std::copy(up, up + 9, environment.world_to_map);
+    scene_.environment = environment;
+    lumicut_light sun{};
+    sun.struct_size = sizeof(sun);
+    sun.type = LUMICUT_SUN, sun.value = 1, sun.radius = static_cast<float>(0.2666 * kPi / 180);
+    const auto irradiance = sky.sun_irradiance(), towards = sky.sun_direction();
+    for (size_t k = 0; k < 3; ++k) sun.color[k] = static_cast<float>(irradiance[k]);
+    const Vec down = Vec{towards[0], towards[2], -towards[1]} * -1.0;
+    for (size_t k = 0; k < 3; ++k) sun.direction[k] = static_cast<float>(down[k]);
+    scene_.lights.push_back(sun);
+    scene_.light_names.emplace_back("sky");
+  }
+
+  std::string path_;
+  SceneData scene_;
+  gltf::Model model_;
+  Folder folder_;
+  TextureStore textures_;
+  std::map<std::pair<int, size_t>, int32_t> channels_;
+  std::vector<size_t> first_;  // of a mesh's primitives in scene_.meshes; one more at the end
+  bool has_camera_ = false;
+  size_t placed_nodes_ = 0;
+};
+
+}  // namespace
+
+bool is_gltf(const std::string& path) {
+  std::string ending = fs::path(path).extension().string();
+  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return ending == ".gltf" || ending == ".glb";
+}
+
+SceneData read_gltf(const std::string& path) { return Reader(path).read(); }
+
+}  // namespace lumicut::io

@@ -1,0 +1,185 @@
+"""glTF scenes, which the test writes: what is read of them, and what is said of those that are wrong."""
+import base64
+import json
+import math
+import struct
+import unittest
+import zlib
+
+import OpenImageIO as oiio
+
+import cli
+from cli import BAD_FILE, OK, lumicut
+
+SQUARE = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]
+FACES = (0, 1, 2, 0, 2, 3)
+
+
+def read_exr(path):
+    """{channel: values, row by row from the top}"""
+    opened = oiio.ImageInput.open(str(path))
+    pixels = opened.read_image("float").reshape(-1, opened.spec().nchannels)
+    return {name: pixels[:, i].tolist() for i, name in enumerate(opened.spec().channelnames)}
+
+
+def png(width, height, pixels):
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    rows = b"".join(b"\0" + bytes(v for p in pixels[y * width:(y + 1) * width] for v in p) for y in range(height))
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) +
+            chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+
+
+class Document:
+    """A glTF document that grows by parts."""
+
+    def __init__(self):
+        self.bytes = b""
+        self.json = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}], "nodes": [], "meshes": [], "materials": [],
+                     "accessors": [], "bufferViews": [], "cameras": []}
+
+    def accessor(self, values, kind, letter="f"):
+        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}[kind]
+        data = struct.pack(f"<{len(values)}{letter}", *values)
+        self.json["bufferViews"].append({"buffer": 0, "byteOffset": len(self.bytes), "byteLength": len(data)})
+        self.bytes += data + b"\0" * (-len(data) % 4)
+        component = {"f": 5126, "H": 5123, "I": 5125}[letter]
+        self.json["accessors"].append({"bufferView": len(self.json["bufferViews"]) - 1, "componentType": component, "type": kind,
+                                       "count": len(values) // width})
+        return len(self.json["accessors"]) - 1
+
+    def square(self, material=None, uvs=None):
+        primitive = {"attributes": {"POSITION": self.accessor([x for p in SQUARE for x in p], "VEC3")},
+                     "indices": self.accessor(FACES, "SCALAR", "H")}
+        if uvs:
+            primitive["attributes"]["TEXCOORD_0"] = self.accessor(uvs, "VEC2")
+        if material is not None:
+            self.json["materials"].append(material)
+            primitive["material"] = len(self.json["materials"]) - 1
+        self.json["meshes"].append({"primitives": [primitive]})
+        return len(self.json["meshes"]) - 1
+
+    def node(self, **fields):
+        self.json["nodes"].append(fields)
+        self.json["scenes"][0]["nodes"].append(len(self.json["nodes"]) - 1)
+
+    def camera(self, distance=3.0, height=2.0):
+        self.json["cameras"].append({"type": "orthographic", "orthographic": {"xmag": height / 2, "ymag": height / 2, "znear": 0.1, "zfar": 99}})
+        self.node(camera=len(self.json["cameras"]) - 1, translation=[0, 0, distance])
+
+    def light(self, kind, intensity, **node):
+        self.json.setdefault("extensions", {}).setdefault("KHR_lights_punctual", {"lights": []})["lights"].append(
+            {"type": kind, "intensity": intensity} | ({"spot": {}} if kind == "spot" else {}))
+        number = len(self.json["extensions"]["KHR_lights_punctual"]["lights"]) - 1
+        self.json["extensionsUsed"] = ["KHR_lights_punctual"]
+        self.node(extensions={"KHR_lights_punctual": {"light": number}}, **node)
+
+    def write(self, path):
+        text = dict(self.json)
+        for name in ("materials", "cameras"):
+            if not text[name]:
+                del text[name]
+        if path.suffix == ".glb":
+            text["buffers"] = [{"byteLength": len(self.bytes)}]
+            head = json.dumps(text).encode()
+            head += b" " * (-len(head) % 4)
+            path.write_bytes(struct.pack("<4sII", b"glTF", 2, 28 + len(head) + len(self.bytes)) + struct.pack("<I4s", len(head), b"JSON") +
+                             head + struct.pack("<I4s", len(self.bytes), b"BIN\0") + self.bytes)
+        else:
+            text["buffers"] = [{"byteLength": len(self.bytes),
+                                "uri": "data:application/octet-stream;base64," + base64.b64encode(self.bytes).decode()}]
+            path.write_text(json.dumps(text))
+        return path
+
+
+class Gltf(cli.Cli):
+    def render(self, path, *words, size="16x16", layers="radiance"):
+        out = self.folder / "out.exr"
+        done = lumicut("render", path, "-o", out, "--size", size, "--layers", layers, "-i", "exhaustive", "-p", "clamp_lights=0", *words)
+        self.assertEqual(done.returncode, OK, done.stderr)
+        return read_exr(out), done.stderr
+
+    def test_lux_below_a_lamp_are_candela_over_squared_distance_in_either_form_of_file(self):
+        for name in ("scene.gltf", "scene.glb"):
+            d = Document()
+            d.node(mesh=d.square({"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicFactor": 0, "roughnessFactor": 1},
+                                  "extensions": {"KHR_materials_specular": {"specularFactor": 0}}}))
+            d.camera(height=0.02)
+            d.light("point", 683, translation=[0, 0, 2])
+            image, _ = self.render(d.write(self.folder / name), size="4x4")
+            self.assertAlmostEqual(image["R"][5], 0.5 / math.pi / 4, delta=2e-4, msg=name)
+
+    def test_nodes_and_instances_are_where_their_transforms_say(self):
+        d = Document()
+        mesh = d.square({"emissiveFactor": [1, 1, 1]})
+        d.node(mesh=mesh, scale=[0.25, 0.25, 1], translation=[-0.5, 0.5, 0])
+        d.node(mesh=mesh, scale=[0.25, 0.25, 1], extensions={"EXT_mesh_gpu_instancing": {"attributes": {
+            "TRANSLATION": d.accessor([2, 2, 0, -2, -2, 0], "VEC3")}}})
+        d.camera()
+        image, _ = self.render(d.write(self.folder / "a.gltf"), layers="radiance,depth", size="8x8")
+        seen = {(i % 8 // 4, i // 8 // 4) for i, v in enumerate(image["R"]) if v > 0.9}
+        self.assertEqual(seen, {(0, 0), (1, 0), (0, 1)})  # upper left, upper right, lower left
+
+    def test_emission_has_its_strength(self):
+        d = Document()
+        d.node(mesh=d.square({"emissiveFactor": [0.5, 1, 0], "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 6}}}))
+        d.camera()
+        image, _ = self.render(d.write(self.folder / "a.gltf"), size="4x4")
+        self.assertEqual([round(image[c][5], 5) for c in "RGB"], [3, 6, 0])
+
+    def test_textures_turn_and_lie_as_their_transform_says(self):
+        # Red, green above; blue, white below, without a filter.
+        four = self.folder / "four.png"
+        four.write_bytes(png(2, 2, [(255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 255)]))
+        # Turned coordinates go counter-clockwise, and so the image clockwise.
+        for transform, expected in (({}, "RGBW"), ({"offset": [0.5, 0]}, "GRWB"), ({"rotation": math.pi / 2, "offset": [0, 1]}, "BRWG")):
+            d = Document()
+            d.json["images"], d.json["samplers"] = [{"uri": four.name}], [{"magFilter": 9728}]
+            d.json["textures"] = [{"source": 0, "sampler": 0}]
+            texture = {"index": 0, "extensions": {"KHR_texture_transform": transform}}
+            d.node(mesh=d.square({"pbrMetallicRoughness": {"baseColorTexture": texture, "metallicFactor": 0}}, [0, 1, 1, 1, 1, 0, 0, 0]))
+            d.camera()
+            image, _ = self.render(d.write(self.folder / "a.gltf"), layers="albedo", size="4x4")
+            letters = {(True, False, False): "R", (False, True, False): "G", (False, False, True): "B", (True, True, True): "W"}
+            found = "".join(letters[tuple(image[f"albedo.{c}"][i] > 0.5 for c in "RGB")] for i in (0, 3, 12, 15))
+            self.assertEqual(found, expected, transform)
+
+    def test_a_file_without_camera_and_light_is_framed_under_a_sky(self):
+        d = Document()
+        d.node(mesh=d.square(), translation=[1000, 50, -20], rotation=[-0.70710678, 0, 0, 0.70710678], scale=[30, 30, 1])
+        image, _ = self.render(d.write(self.folder / "a.gltf"), layers="radiance,depth", size="32x32", *("--vpls", "300"))
+        hit = [v for v in image["Z"] if v > 0 and math.isfinite(v) and v < 1e30]
+        self.assertGreater(len(hit), 0.1 * 32 * 32)
+        self.assertLess(len(hit), 32 * 32)
+        self.assertGreater(min(image["B"]), 0)
+
+    def test_what_is_left_out_is_named(self):
+        d = Document()
+        d.node(mesh=d.square({"emissiveFactor": [1, 1, 1]}))
+        d.camera()
+        d.json["extensionsUsed"] = ["KHR_materials_sheen"]
+        _, said = self.render(d.write(self.folder / "a.gltf"))
+        self.assertIn("KHR_materials_sheen: left out", said)
+
+    def test_wrong_files_are_refused_by_name(self):
+        def wrong(change, *texts):
+            d = Document()
+            d.node(mesh=d.square({}))
+            change(d)
+            done = lumicut("render", d.write(self.folder / "bad.gltf"), "-o", self.folder / "x.exr", "--size", "8x8")
+            self.assert_ends(done, BAD_FILE, "bad.gltf", *texts)
+        wrong(lambda d: d.json["accessors"][1].update(count=4000), "accessors[1]", "4000", "buffers[0]")
+        wrong(lambda d: d.json["nodes"].__setitem__(0, {"mesh": 7}), "nodes[0]", "7")
+        wrong(lambda d: d.json["nodes"][0].update(children=[0]), "nodes[0]", "without end")
+        wrong(lambda d: d.json["materials"][0].update(pbrMetallicRoughness={"roughnessFactor": 3}), "materials[0].roughnessFactor", "3")
+        wrong(lambda d: d.json.update(extensionsRequired=["KHR_draco_mesh_compression"], extensionsUsed=["KHR_draco_mesh_compression"]),
+              "KHR_draco_mesh_compression")
+        wrong(lambda d: d.json["nodes"].clear() or d.json["scenes"][0].update(nodes=[]), "no triangles")
+        for name, content in (("torn.glb", b"glTF\2\0\0\0\xff\0\0\0"), ("text.gltf", b"{"), ("empty.gltf", b"")):
+            (self.folder / name).write_bytes(content)
+            self.assert_ends(lumicut("render", self.folder / name, "-o", self.folder / "x.exr"), BAD_FILE, name)
+        self.assert_ends(lumicut("render", self.folder / "no.glb", "-o", self.folder / "x.exr"), BAD_FILE, "no.glb")
+
+
+if __name__ == "__main__":
+    unittest.main()
