@@ -79,7 +79,7 @@ Vpl LightSampler::place_on(size_t i, const EmitterShape& s, const Vec3f& at, con
     hit.hit.prim = e.triangle, hit.hit.geom = e.index, hit.hit.inst = scene_.hit_instance(e.index, e.instance);
     const SurfaceHit surface = scene_.surface(hit);
     if (s.both_sides && dot(from - at, v.normal) < 0.0f) v.normal = -v.normal;
-    Rgb radiance = scene_.emitted(surface, v.normal);
+    Rgb radiance = scene_.emitted_on_average(surface, v.normal);
     if (scene_.materials()[surface.material].cutout())
       radiance *= scene_.opacity(e.index, e.triangle, hit.hit.u, hit.hit.v, e.instance);
     v.intensity = radiance * area, v.group = scene_.meshes()[e.index].group;

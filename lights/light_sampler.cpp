@@ -231,7 +231,7 @@ void LightSampler::add_programmed(uint32_t id, const Progress* progress) {
           u -= std::floor(u), v -= std::floor(v);
           if (u + v > 1) u = 1 - u, v = 1 - v;
           const SurfaceHit place = scene_.place_on(m, t, static_cast<float>(u), static_cast<float>(v), i);
-          const double e = luminance(scene_.emitted(place, place.geometric_normal));
+          const double e = luminance(scene_.emitted_on_average(place, place.geometric_normal));
           sum += e, square += e * e;
         }
         const double mean = sum / static_cast<double>(n), variance = square / static_cast<double>(n) - mean * mean;

@@ -63,7 +63,7 @@ LightSampler::Surface LightSampler::sample_surface(const Emitter& e, Rng& rng) c
       if (rng.next_float() < 0.5f) surface.geometric_normal = -surface.geometric_normal;
       area_pdf *= 0.5f;
     }
-    Rgb radiance = scene_.emitted(surface, surface.geometric_normal);
+    Rgb radiance = scene_.emitted_on_average(surface, surface.geometric_normal);
     if (material.cutout())
       radiance *= scene_.opacity(e.index, e.triangle, hit.hit.u, hit.hit.v, e.instance);  // as rays meet it
     return {surface.position, surface.geometric_normal, radiance, area_pdf, surface.offset};

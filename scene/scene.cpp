@@ -586,6 +586,15 @@ Rgb Scene::emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const {
   return m.emission * texture.color(hit.uv.x, hit.uv.y);
 }
 
+// As it is seen at the mean cosine of what a surface sends out evenly.
+Rgb Scene::emitted_on_average(const SurfaceHit& hit, const Vec3f& normal) const {
+  constexpr float kCosine = 2.0f / 3.0f, kSine = 0.745356f;
+  const int32_t texture = materials_[hit.material].emission_texture;
+  const TextureProgram* program = texture < 0 ? nullptr : textures_[texture].program();
+  if (program == nullptr || !program->varies_with_view()) return emitted(hit, normal);
+  return emitted(hit, normal * kCosine + Frame(normal).t * kSine);
+}
+
 Vec2f Scene::environment_uv(const Vec3f& direction) const {
   const float* m = environment_.world_to_map;
   const Vec3f d{m[0] * direction.x + m[1] * direction.y + m[2] * direction.z,

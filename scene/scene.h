@@ -128,6 +128,8 @@ class Scene final : private HitFilter {
   bool may_be_specular() const;
   // Radiance emitted by a surface towards `to_viewer`.
   Rgb emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const;
+  // About the mean of that over the side that `normal` points to, where the view makes a difference.
+  Rgb emitted_on_average(const SurfaceHit& hit, const Vec3f& normal) const;
   // Share of rays that a place of a triangle stops: factor times mask.
   float opacity(uint32_t mesh, uint32_t prim, float u, float v, uint32_t instance = 0) const;
   // Whether what surfaces look like depends on the camera.

@@ -589,9 +589,13 @@ class Materials:
             if value.picture is not None and value.is_zero():
                 value = ZERO
             if value.picture is not None and value.picture.is_by_view() and slot in ("emission", "opacity"):
-                if not np.ptp(value.picture.linear()) < 1e-6:
-                    self.report.note(f"{name} ({slot})", "Emission and holes that depend on the view, taken as their mean")
-                value = Value(np.round(value.mean(), 6))
+                varies = not np.ptp(value.picture.linear()) < 1e-6
+                if varies and slot == "emission":
+                    value = Value(value.factor, ProgramPicture(name, of_picture(value.picture)))
+                else:
+                    if varies:
+                        self.report.note(f"{name} ({slot})", "Holes that depend on the view, taken as their mean")
+                    value = Value(np.round(value.mean(), 6))
             factors[slot] = np.maximum(np.nan_to_num(value.factor), 0)
             if value.picture is not None:
                 pictures[slot] = value.picture

@@ -207,6 +207,57 @@ class Inputs(Board):
             self.compare(node.outputs[name], name=name)
 
 
+    def test_emission_that_depends_on_the_view(self):
+        self.scene.camera.data.type = "PERSP"
+        self.ob.hide_render = True
+        h.add_sphere(1.4, (0.1, 0, 0), self.m, 32)
+        self.compare(self.node("LayerWeight", Blend=0.4).outputs["Facing"], name="plain")
+        emission = self.node("Emission", Color=self.node("Fresnel", IOR=1.6).outputs[0], Strength=3.0)
+        self.link(emission.outputs[0], self.out.inputs["Surface"])
+        with h.quiet():
+            h.set_lumicut("exhaustive", samples=1, vpls=10)
+            ours = h.radiance(h.render())
+            h.set_cycles(1, 0)
+            self.scene.cycles.pixel_filter_type, self.scene.cycles.filter_width = "BOX", 0.01
+            theirs = h.radiance(h.render())
+        # From a table of 64 entries, linear between them.
+        self.assertLess(np.abs(ours - theirs).max(), 0.05)
+
+
+class Normals(Board):
+    """Slopes are taken over a two-thousandth of the distance here, and over a pixel in Cycles: small pieces are shown."""
+
+    def pieces(self, fn):
+        """fn's output seen in small views here and there."""
+        for place in self.each([(0, 0), (0.5, -0.4), (-0.7, 0.2), (0.3, 0.6), (-0.4, -0.8)]):
+            self.scene.camera.location.x, self.scene.camera.location.y = place
+            self.scene.camera.data.ortho_scale = 0.08
+            self.compare(fn(), tolerance=0.01)
+
+    def height(self, scale):
+        return self.node("TexNoise", Scale=scale, Detail=0.0, Vector=self.node("TexCoord").outputs["Object"]).outputs["Fac"]
+
+    def test_bumps_of_any_height(self):
+        for invert in (False, True):
+            self.pieces(lambda invert=invert: self.node("Bump", {"invert": invert}, Height=self.height(0.8), Strength=0.7, Distance=0.8).outputs[0])
+
+    def test_bumps_upon_bumps(self):
+        def second():
+            first = self.node("Bump", Height=self.height(0.6), Strength=0.9, Distance=0.6)
+            return self.node("Bump", Height=self.height(0.9), Strength=0.6, Distance=0.5, Normal=first.outputs[0]).outputs[0]
+
+        self.pieces(second)
+
+    def test_normal_maps_of_every_space(self):
+        for space in self.each(["TANGENT", "OBJECT", "WORLD", "BLENDER_OBJECT", "BLENDER_WORLD"]):
+            colour = self.node("CombineColor")
+            for k in range(3):
+                self.link(self.node("MapRange", Value=self.node("SeparateXYZ", Vector=self.coordinates()).outputs[k % 2]).outputs[0], colour.inputs[k])
+                colour.inputs[k].links[0].from_node.inputs["From Min"].default_value = -2
+                colour.inputs[k].links[0].from_node.inputs["To Min"].default_value = 0.55 if k == 2 else 0.2
+            self.compare(self.node("NormalMap", {"space": space}, Color=colour.outputs[0], Strength=0.8).outputs[0])
+
+
 class Textures(Board):
     def test_noise(self):
         for dimensions in self.each(["1D", "2D", "3D", "4D"]):
@@ -511,7 +562,7 @@ class Shaders(Board):
 
     def lit(self, integrator):
         with h.quiet():
-            h.set_lumicut(integrator, samples=64, **({"samples_per_point": 16} if integrator == "nothing" else {"vpls": 4000} if integrator == "exhaustive" else {}))
+            h.set_lumicut(integrator, samples=64, **({"vpls": 4000} if integrator == "exhaustive" else {}))
             ours = h.radiance(h.render())
             h.set_cycles(512, 1)
             theirs = h.radiance(h.render())
