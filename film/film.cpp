@@ -1,5 +1,6 @@
 #include "film/film.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "core/error.h"
@@ -72,7 +73,7 @@ bool Film::load(std::span<const uint8_t> bytes) {
                  [&](const std::vector<float>& plane) { size += plane.size() * sizeof(float); });
   if (bytes.size() != size) return false;
   for_each_plane(planes_, group_planes_, [&](std::vector<float>& plane) {
-    std::memcpy(plane.data(), bytes.data(), plane.size() * sizeof(float));
+    std::copy_n(bytes.data(), plane.size() * sizeof(float), reinterpret_cast<uint8_t*>(plane.data()));
     bytes = bytes.subspan(plane.size() * sizeof(float));
   });
   return true;
