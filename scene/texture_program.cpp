@@ -657,7 +657,8 @@ Vec3f TextureProgram::value(const ProgramInstruction& in, const ProgramPoint& p,
     const Vec4f v = place(0, 1);
     return dimensions == 1 ? Vec4f{v.w, 0, 0, 0} : v;
   };
-  const float* table = table_.data() + in.data;
+  // Of ramps and curves; attributes and images number other things with `data`.
+  const float* table = in.data < table_.size() ? table_.data() + in.data : nullptr;
   switch (static_cast<ProgramOp>(in.op)) {
     case ProgramOp::uv:
       return {p.uv.x, p.uv.y, 0.0f};
