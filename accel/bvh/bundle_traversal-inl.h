@@ -267,11 +267,20 @@ HWY_NOINLINE void trace_points_in_bundles(const TraceScene& scene, const BundleO
       const size_t here = std::min(kLanes, count - i);
       const auto in_range = hn::FirstN(d, here);
       VN p[3];
-      if (here == kLanes)
-        p[0] = hn::LoadU(d, px + begin + i), p[1] = hn::LoadU(d, py + begin + i), p[2] = hn::LoadU(d, pz + begin + i);
-      else
-        p[0] = hn::MaskedLoad(in_range, d, px + begin + i), p[1] = hn::MaskedLoad(in_range, d, py + begin + i),
-        p[2] = hn::MaskedLoad(in_range, d, pz + begin + i);
+      const float* points[3] = {px + begin + i, py + begin + i, pz + begin + i};
+      for (int axis = 0; axis < 3; ++axis) {
+        if (here == kLanes) {
+          p[axis] = hn::LoadU(d, points[axis]);
+          continue;
+        }
+#if HWY_TARGET <= HWY_AVX2
+        p[axis] = hn::MaskedLoad(in_range, d, points[axis]);
+#else  // there it loads a whole aligned vector
+        HWY_ALIGN float part[kLanes] = {};
+        std::copy_n(points[axis], here, part);
+        p[axis] = hn::Load(d, part);
+#endif
+      }
       if constexpr (!kDirectional) {
         for (int axis = 0; axis < 3; ++axis) {
           p[axis] = hn::Sub(p[axis], hn::Set(d, light[axis]));

@@ -225,6 +225,27 @@ TEST(AgglomerativeBvh, PrimitivesOfSeveralMeshesAreNumberedThrough) {
   for (uint32_t i = 0; i < 15; ++i) EXPECT_EQ(prims[i], i);
 }
 
+// Arrays that a host has may begin at any float, and end where they end.
+TEST(AgglomerativeBvh, PointsToOneLightMayLieAtAnyAddress) {
+  const Mesh mesh = test::random_soup(300, 0.1f, 7);
+  const auto bvh = make_accel("bvh", {{mesh.view()}, {}, nullptr}, {});
+  Rng rng(5, Stage::test);
+  for (const size_t n : {size_t{1}, size_t{3}, size_t{5}, size_t{63}, size_t{67}}) {
+    std::vector<Vec3f> points;
+    for (size_t i = 0; i < n; ++i) points.push_back(test::random_point(rng));
+    std::vector<std::vector<uint8_t>> seen;
+    for (size_t offset = 0; offset < 4; ++offset) {
+      std::vector<float> x(offset), y(offset), z(offset);
+      for (const Vec3f& p : points) x.push_back(p.x), y.push_back(p.y), z.push_back(p.z);
+      std::vector<uint8_t> out(n);
+      bvh->occluded_from_point({{0.5f, 0.5f, 0.5f}, false}, x.data() + offset, y.data() + offset, z.data() + offset, n,
+                               out.data());
+      seen.push_back(out);
+    }
+    for (const auto& out : seen) EXPECT_EQ(out, seen[0]) << n;
+  }
+}
+
 TEST(AgglomerativeBvh, RaysHitBoxesThemselves) {
   const std::vector<Aabb> boxes{{{1, -1, -1}, {2, 1, 1}}, {{4, -1, -1}, {5, 1, 1}}};
   const auto bvh = Bvh::from_boxes(boxes, {});
