@@ -83,6 +83,8 @@ function(lumicut_test name)
   if(LUMICUT_SANITIZE)
     target_compile_definitions(${name} PRIVATE LUMICUT_SANITIZED)
     target_compile_options(${name} PRIVATE -O0)  # what is tested is optimised; GoogleTest's macros take the compiler long
+  else()
+    target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)  # likewise: two thirds of the time that -O3 takes
   endif()
   add_test(NAME ${name} COMMAND ${name})
   if(NOT ARG_TIMEOUT)
