@@ -213,6 +213,7 @@ class Collector:
         self.scene = SceneData()
         self.profiles = lights.Profiles(self.report)
         self._meshes, self._flat = {}, []  # by what they are made from; those of flat instances
+        self._shapes = {}  # lists of meshes of hair, curves and points, likewise
         self._looked_at = set()
         self._sheets = {}  # by mesh: whether it is open, and its extents
         self.instances = 0
@@ -254,6 +255,7 @@ class Collector:
                 self.report.note(ob.name, LEFT_OUT[ob.type])
         self.check()
         self.scene.meshes = [mesh for mesh in self._meshes.values() if mesh is not None and mesh.transforms] + self._flat
+        self.scene.meshes += [mesh for made in self._shapes.values() for mesh in made if mesh.transforms]
         scene = self.depsgraph.scene_eval
         bake = (lambda world: self.bake(world, scene.frame_current, self.check)) if self.bake is not None else None
         world = (getattr(layer, "world_override", None) or scene.world) if layer.use_sky else None
@@ -288,6 +290,10 @@ class Collector:
 
     def _group(self, owner):
         return self.groups.get(getattr(owner, "lightgroup", ""), 0)
+
+    def _group_of_light(self, ob, numbers):
+        """Light group of an object with these materials, if they shine."""
+        return self._group(ob) if any(any(self.materials.converted[n].values.emission) for n in numbers) else 0
 
     def _slots(self, ob, override):
         if override is not None:
@@ -326,10 +332,11 @@ class Collector:
             slots = self._slots(ob, override)
             slot = slots[min(settings.material, len(slots)) - 1]
 
-            def shape(system=system):
+            def shape(textured, system=system):
                 places, radii, numbers = strands.hair_of_particles(ob, system, self.depsgraph.mode == "VIEWPORT", self.check)
                 places, radii = strands.straightened(places, radii)
-                return [(*strands.tubes(places, radii), self._root_uvs(ob, system, numbers, places.shape[1]))]
+                uvs = self._root_uvs(ob, system, numbers, places.shape[1]) if textured else None
+                return [(*strands.tubes(places, radii), uvs)]
 
             self._add_shapes(instance, ob, slot, ("hair", ob.as_pointer(), system.name), f"{ob.name}: {system.name}", shape)
 
@@ -348,57 +355,49 @@ class Collector:
         return np.repeat(uvs, keys * strands.SIDES, axis=0)
 
     def _add_curves(self, instance, ob, override):
-        def shape():
-            return [(*strands.tubes(places, radii), None) for places, radii in strands.curve_strands(ob.data)]
+        def shape(_):
+            return [(*strands.tubes(places, radii), None) for places, radii in strands.curve_strands(ob.data, fetch)]
 
         self._add_shapes(instance, ob, self._slots(ob, override)[0], ("curves", ob.data.as_pointer()), ob.name, shape)
 
     def _add_shapes(self, instance, ob, material, key, name, shape):
-        """Meshes that are made here, once for all instances: `shape` gives [(positions, normals, indices, uvs)]."""
+        """Adds meshes that are made here, once for all instances. `shape`, told whether its material has textures, gives
+        [(positions, normals, indices, uvs)]."""
         for numbers, mask in self._variants(ob, [material], lambda: False):
-            number = numbers[0]
-            group = self._group(ob) if any(self.materials.converted[number].values.emission) else 0
+            number, group = numbers[0], self._group_of_light(ob, numbers)
             if self.materials.converted[number].is_hole():
                 continue
-            if (key, 0, number, group, mask) not in self._meshes:
+            made = key, number, group, mask
+            if made not in self._shapes:
                 self.check()
-                textured = bool(self.materials.converted[number].plain_pictures())
-                for part, (positions, normals, indices, uvs) in enumerate(shape()):
-                    self._meshes[key, part, number, group, mask] = Mesh(
-                        name, positions, indices, normals, uvs if textured else None, None, number, [], group, mask)
-            part = 0
-            while (key, part, number, group, mask) in self._meshes:
-                target = self._meshes[key, part, number, group, mask]
-                if len(target.indices):
-                    target.transforms.append(rows(instance.matrix_world))
-                    self.instances += 1
-                part += 1
+                self._shapes[made] = [Mesh(name, positions, indices, normals, uvs, None, number, [], group, mask)
+                                      for positions, normals, indices, uvs
+                                      in shape(bool(self.materials.converted[number].plain_pictures())) if len(indices)]
+            for mesh in self._shapes[made]:
+                mesh.transforms.append(rows(instance.matrix_world))
+                self.instances += 1
 
     def _add_points(self, instance, ob, override):
         cloud = ob.data
         count = len(cloud.points)
-        places = strands.read(cloud.attributes["position"].data, "vector", count, 3)
+        places = fetch(cloud.attributes["position"].data, "vector", count, 3, np.float32)
         radius = cloud.attributes.get("radius")
-        radii = strands.read(radius.data, "value", count) if radius is not None else np.full(count, 0.01, np.float32)
-        matrix = np.array(instance.matrix_world)
+        radii = fetch(radius.data, "value", count, 1, np.float32) if radius is not None else np.full(count, 0.01, np.float32)
+        transforms = strands.spheres(places, radii, np.array(instance.matrix_world))
         for numbers, mask in self._variants(ob, [self._slots(ob, override)[0]], lambda: False):
-            number = numbers[0]
+            number, group = numbers[0], self._group_of_light(ob, numbers)
             if self.materials.converted[number].is_hole():
                 continue
-            group = self._group(ob) if any(self.materials.converted[number].values.emission) else 0
-            key = "sphere", number, group, mask
-            if key not in self._meshes:
+            made = "sphere", number, group, mask
+            if made not in self._shapes:
                 positions, indices = strands.unit_sphere()
-                self._meshes[key] = Mesh("spheres of points", positions, indices, positions, None, None, number, [], group, mask)
-            self.check()
-            for transform in strands.spheres(places, radii):
-                local = np.vstack([np.reshape(transform, (3, 4)), (0, 0, 0, 1)])
-                self._meshes[key].transforms.append((matrix @ local)[:3].ravel().tolist())
-                self.instances += 1
+                self._shapes[made] = [Mesh("spheres of points", positions, indices, positions, None, None, number, [], group, mask)]
+            self._shapes[made][0].transforms += transforms
+            self.instances += len(transforms)
 
     def _add_variant(self, instance, ob, mesh, slots, numbers, mask):
         """`numbers`: materials by slot; `mask`: of the rays that see them."""
-        group = self._group(ob) if any(any(self.materials.converted[n].values.emission) for n in numbers) else 0
+        group = self._group_of_light(ob, numbers)
         key = (mesh.as_pointer(), numbers, group, mask)
         if key not in self._meshes:
             self.check()

@@ -87,19 +87,13 @@ def tubes(places, radii):
             indices[wide].astype(np.int32))
 
 
-def read(collection, name, count, width=1):
-    out = np.empty(count * width, np.float32)
-    collection.foreach_get(name, out)
-    return out.reshape(count, width) if width > 1 else out
-
-
-def curve_strands(curves):
-    """Of a curves object: groups of strands with as many keys, as (places, radii)."""
+def curve_strands(curves, fetch):
+    """Of a curves object: groups of strands with as many keys, as (places, radii). `fetch`: collect.fetch."""
     count = len(curves.points)
-    attributes = curves.attributes
-    places = read(attributes["position"].data, "vector", count, 3).astype(np.float64)
-    radius = attributes.get("radius")
-    radii = read(radius.data, "value", count) if radius is not None and radius.domain == "POINT" else np.full(count, DEFAULT_RADIUS)
+    places = fetch(curves.attributes["position"].data, "vector", count, 3, np.float32).astype(np.float64)
+    radius = curves.attributes.get("radius")
+    known = radius is not None and radius.domain == "POINT"
+    radii = fetch(radius.data, "value", count, 1, np.float32) if known else np.full(count, DEFAULT_RADIUS)
     first = np.array([curve.first_point_index for curve in curves.curves], np.int64)
     lengths = np.array([curve.points_length for curve in curves.curves], np.int64)
     for keys in np.unique(lengths[lengths > 1]):
@@ -107,9 +101,13 @@ def curve_strands(curves):
         yield places[at], radii[at]
 
 
-def spheres(places, radii):
-    """3x4 transforms of a unit sphere, one a point."""
-    return [[r, 0, 0, p[0], 0, r, 0, p[1], 0, 0, r, p[2]] for p, r in zip(places.tolist(), radii.tolist()) if r > 0]
+def spheres(places, radii, matrix):
+    """3x4 transforms of a unit sphere to the world, one a point; `matrix`: the object's, 4x4."""
+    kept = radii > 0
+    out = np.empty((kept.sum(), 3, 4))
+    out[:, :, :3] = matrix[:3, :3] * radii[kept, None, None]
+    out[:, :, 3] = places[kept] @ matrix[:3, :3].T + matrix[:3, 3]
+    return out.reshape(-1, 12).tolist()
 
 
 def unit_sphere(subdivisions=2):

@@ -52,6 +52,16 @@ class Board(unittest.TestCase):
     def link(self, output, socket):
         self.m.node_tree.links.new(output, socket)
 
+    def both(self):
+        """(ours, Cycles'), one sample in the middle of each pixel."""
+        with h.quiet():
+            h.set_lumicut("exhaustive", samples=1, vpls=10)
+            ours = h.radiance(h.render())
+            h.set_cycles(1, 0)
+            self.scene.cycles.pixel_filter_type, self.scene.cycles.filter_width = "BOX", 0.01
+            theirs = h.radiance(h.render())
+        return ours, theirs
+
     def show(self, output):
         """Both pictures of an output, shifted and scaled so that negative values show."""
         shown = self.node("VectorMath", {"operation": "MULTIPLY_ADD"})
@@ -60,12 +70,7 @@ class Board(unittest.TestCase):
         emission = self.node("Emission")
         self.link(shown.outputs[0], emission.inputs["Color"])
         self.link(emission.outputs[0], self.out.inputs["Surface"])
-        with h.quiet():
-            h.set_lumicut("exhaustive", samples=1, vpls=10)
-            ours = h.radiance(h.render())
-            h.set_cycles(1, 0)
-            self.scene.cycles.pixel_filter_type, self.scene.cycles.filter_width = "BOX", 0.01
-            theirs = h.radiance(h.render())
+        ours, theirs = self.both()
         return (ours - 2) * 8, (theirs - 2) * 8
 
     def compare(self, output, most=SEAMS, tolerance=1e-3, name=""):
@@ -214,12 +219,7 @@ class Inputs(Board):
         self.compare(self.node("LayerWeight", Blend=0.4).outputs["Facing"], name="plain")
         emission = self.node("Emission", Color=self.node("Fresnel", IOR=1.6).outputs[0], Strength=3.0)
         self.link(emission.outputs[0], self.out.inputs["Surface"])
-        with h.quiet():
-            h.set_lumicut("exhaustive", samples=1, vpls=10)
-            ours = h.radiance(h.render())
-            h.set_cycles(1, 0)
-            self.scene.cycles.pixel_filter_type, self.scene.cycles.filter_width = "BOX", 0.01
-            theirs = h.radiance(h.render())
+        ours, theirs = self.both()
         # From a table of 64 entries, linear between them.
         self.assertLess(np.abs(ours - theirs).max(), 0.05)
 

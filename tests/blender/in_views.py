@@ -8,16 +8,21 @@ import helpers as h
 from lumicut_blender import cameras
 
 
+def ball_in_the_sun(width, height):
+    scene = h.new_scene(width, height)
+    h.set_world((0.1, 0.15, 0.2))
+    h.add_plane(6, -0.5, h.diffuse())
+    h.add_sphere(0.8, (0.2, 0.1, 0.4), h.diffuse((0.9, 0.1, 0.1)))
+    h.add_light("SUN", energy=2, rotation=(0.3, 0.4, 0), angle=0.0)
+    scene.camera.rotation_euler = (0.4, 0, 0)
+    scene.camera.location = (0, -2.5, 5)
+    return scene
+
+
 class Views(unittest.TestCase):
     def setUp(self):
-        self.scene = h.new_scene(40, 30)
+        self.scene = ball_in_the_sun(40, 30)
         self.layer = self.scene.view_layers[0]
-        h.set_world((0.1, 0.15, 0.2))
-        h.add_plane(6, -0.5, h.diffuse())
-        h.add_sphere(0.8, (0.2, 0.1, 0.4), h.diffuse((0.9, 0.1, 0.1)))
-        h.add_light("SUN", energy=2, rotation=(0.3, 0.4, 0), angle=0.0)
-        self.scene.camera.rotation_euler = (0.4, 0, 0)
-        self.scene.camera.location = (0, -2.5, 5)
 
     # ---- Film ---------------------------------------------------------------------------------------------------
 
@@ -177,14 +182,8 @@ class Views(unittest.TestCase):
 
 class Denoising(unittest.TestCase):
     def setUp(self):
-        self.scene = h.new_scene(60, 40)
+        self.scene = ball_in_the_sun(60, 40)
         self.layer = self.scene.view_layers[0]
-        h.set_world((0.1, 0.15, 0.2))
-        h.add_plane(6, -0.5, h.diffuse())
-        h.add_sphere(0.8, (0.2, 0.1, 0.4), h.diffuse((0.9, 0.1, 0.1)))
-        h.add_light("SUN", energy=2, rotation=(0.3, 0.4, 0), angle=0.0)
-        self.scene.camera.rotation_euler = (0.4, 0, 0)
-        self.scene.camera.location = (0, -2.5, 5)
         self.layer.lumicut.use_pass_denoising = True
         self.layer.lumicut.use_pass_error = True
 
