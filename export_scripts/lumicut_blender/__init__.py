@@ -13,12 +13,12 @@ bl_info = {
 if "bpy" in locals():  # reloaded by the host: its parts, too, from the bottom up
     import importlib
     for _part in (library, report, scene_data, images, mappings, programs, nodes, mesh_attributes, materials, ies, sky, directions,  # noqa: F821
-                  lights, worlds, cameras, soft_spots, collect, runtime, properties, passes, export, viewport, engine, preferences, panels):  # noqa: F821
+                  lights, worlds, cameras, soft_spots, collect, runtime, properties, shadow_catcher, passes, export, viewport, engine, preferences, panels):  # noqa: F821
         importlib.reload(_part)
 else:
     from .lumicut import library  # noqa: F401
     from . import (cameras, collect, directions, engine, export, ies, images, lights, mappings, materials, mesh_attributes, nodes, panels,  # noqa: F401
-                   passes, preferences, programs, properties, report, runtime, scene_data, sky, soft_spots, viewport, worlds)
+                   passes, preferences, programs, properties, report, runtime, scene_data, shadow_catcher, sky, soft_spots, viewport, worlds)
 
 import bpy  # noqa: E402, F401
 

@@ -247,6 +247,8 @@ class Collector:
                 if light is not None:
                     light.group = self._group(ob)
                     self.scene.lights.append((ob.name, light))
+                    if not ob.is_shadow_catcher:
+                        self.scene.added_lamps.add(ob.name)
                 if not all(getattr(ob, "visible_" + ray) for ray in ("diffuse", "glossy", "transmission")):
                     self.report.note(ob.name, "Lamps hidden from some rays, which light all here")
                 if ob.visible_camera:
@@ -281,6 +283,9 @@ class Collector:
             self.report.note(scene.name, "Motion blur left out")
         if scene.render.use_freestyle:
             self.report.note(scene.name, "Freestyle lines left out")
+        if any(mesh.catcher for mesh in self.scene.meshes):
+            used = {int(n) for mesh in self.scene.meshes for n in mesh.numbers()}
+            self.scene.held_out = {n: self.materials.held_out(n) for n in sorted(used)}
         # Materials at last: the world's image has been numbered by now.
         self.scene.materials = self.materials.items() or [("default", library.Material())]
         self.scene.images = self.materials.image_items()
@@ -367,10 +372,11 @@ class Collector:
             number, group = numbers[0], self._group_of_light(ob, numbers)
             if self.materials.converted[number].is_hole():
                 continue
-            made = key, number, group, mask
+            made = key, number, group, mask, ob.is_shadow_catcher
             if made not in self._shapes:
                 self.check()
-                self._shapes[made] = [Mesh(name, positions, indices, normals, uvs, None, number, [], group, mask)
+                self._shapes[made] = [Mesh(name, positions, indices, normals, uvs, None, number, [], group, mask,
+                                           catcher=ob.is_shadow_catcher)
                                       for positions, normals, indices, uvs
                                       in shape(bool(self.materials.converted[number].plain_pictures())) if len(indices)]
             for mesh in self._shapes[made]:
@@ -388,22 +394,23 @@ class Collector:
             number, group = numbers[0], self._group_of_light(ob, numbers)
             if self.materials.converted[number].is_hole():
                 continue
-            made = "sphere", number, group, mask
+            made = "sphere", number, group, mask, ob.is_shadow_catcher
             if made not in self._shapes:
                 positions, indices = strands.unit_sphere()
-                self._shapes[made] = [Mesh("spheres of points", positions, indices, positions, None, None, number, [], group, mask)]
+                self._shapes[made] = [Mesh("spheres of points", positions, indices, positions, None, None, number, [], group, mask,
+                                           catcher=ob.is_shadow_catcher)]
             self._shapes[made][0].transforms += transforms
             self.instances += len(transforms)
 
     def _add_variant(self, instance, ob, mesh, slots, numbers, mask):
         """`numbers`: materials by slot; `mask`: of the rays that see them."""
         group = self._group_of_light(ob, numbers)
-        key = (mesh.as_pointer(), numbers, group, mask)
+        key = (mesh.as_pointer(), numbers, group, mask, ob.is_shadow_catcher)
         if key not in self._meshes:
             self.check()
             found = self._read(ob, mesh, slots, numbers)
             if found is not None:
-                found.group, found.mask = group, mask
+                found.group, found.mask, found.catcher = group, mask, ob.is_shadow_catcher
                 if all(self.materials.converted[n].is_hole() for n in found.numbers()):
                     found = None
             self._meshes[key] = found
@@ -444,8 +451,8 @@ class Collector:
         return hidden
 
     def _check_flags(self, ob):
-        if ob.is_shadow_catcher:
-            self.report.note(ob.name, "Shadow catchers taken as ordinary objects")
+        if ob.is_shadow_catcher and self.depsgraph.mode == "VIEWPORT":
+            self.report.note(ob.name, "Shadow catchers taken as ordinary objects in the viewport")
 
     def _read(self, ob, mesh, slots, numbers):
         if self.cache is None:

@@ -7,7 +7,7 @@ import traceback
 
 import bpy
 
-from . import cameras, collect, export, passes, properties, runtime, sky, viewport
+from . import cameras, collect, export, passes, properties, runtime, shadow_catcher, sky, viewport
 from .lumicut import library
 from .report import Report
 
@@ -121,6 +121,9 @@ class LumicutEngine(bpy.types.RenderEngine):
                 report.note(f"{factor:g}", "Film exposure, which scene files do not have")
             if data.backdrop is not None:
                 report.note(scene.world.name, "Worlds that the camera sees otherwise, black in scene files' images")
+            for mesh in data.meshes:
+                if mesh.catcher:
+                    report.note(mesh.name, "Shadow catchers, ordinary objects in scene files")
             if len(views) > 1:
                 report.note(views[0][0], "Of several views the first alone is exported")
         tracing = properties.tracing_of(settings)
@@ -147,7 +150,13 @@ class LumicutEngine(bpy.types.RenderEngine):
                 self._backdrop = (lambda camera, tile, seen=data.backdrop.seen: seen(camera, width, height, tile),
                                   data.environment.group if data.environment is not None else 0)
             lamps, meshes, groups = data.lamps, len(data.meshes), data.groups
-            data = None  # the library has its own copy now
+            catching = {}
+            if not self.is_preview and shadow_catcher.is_needed(data):
+                catching = {name: (part, library.Scene(device, **tracing)) for name, part in shadow_catcher.scenes(data).items()}
+                for part, beside in catching.values():
+                    part.upload(beside, self._check)
+                catching = {name: beside for name, (_, beside) in catching.items()}
+            data = part = None  # the library has its own copy now
             for name, value in parameters.items():
                 integrator.set(name, value)
             for self._view in views:
@@ -156,7 +165,12 @@ class LumicutEngine(bpy.types.RenderEngine):
                 self._check()
                 with library.Render(integrator, target, width, height, samples, crop, self._tile_size(crop),
                                     **self._options) as render:
-                    self._follow(render, depsgraph, crop, height, groups)
+                    finished = self._follow(render, depsgraph, crop, height, groups, not catching)
+                    self._caught = {name: self._frame_beside(watched, name, beside, integrator_name, parameters, samples,
+                                                             finished.passes_done, width, height, crop)
+                                    for name, beside in catching.items()}
+                    self._write(render, depsgraph, self._chosen, crop, crop, height)
+                    self.update_progress(1.0)
                     stats = render.stats()
         if not self.is_preview:
             runtime.last.update(stats=stats, collect_seconds=collected, seconds=time.perf_counter() - started,
@@ -208,11 +222,36 @@ class LumicutEngine(bpy.types.RenderEngine):
             self._notes, self._told = (frame, Report()), set()
         return self._notes[1]
 
-    def _follow(self, render, depsgraph, crop, height, groups):
-        """Polls until the frame is done; hands tiles over as they finish."""
-        chosen = self._pass_list(depsgraph, groups, render.groups())
-        show_tiles = not bpy.app.background
-        stopped, tiles_shown = False, 0.0
+    def _frame_beside(self, watched, name, scene, integrator_name, parameters, samples, passes_done, width, height, crop):
+        """{channel: pixels} of another scene, rendered as the whole one was [shadow_catcher.py]."""
+        scene.set_camera(self._view[1])
+        watched.run(scene, "acceleration structure", scene.commit)
+        flags = self._options["flags"] & (library.DENOISE | library.KEEP_FIREFLIES)
+        with library.Integrator(scene.device, integrator_name) as integrator:
+            for parameter, value in parameters.items():
+                integrator.set(parameter, value)
+            with library.Render(integrator, scene, width, height, samples, crop, self._tile_size(crop), passes=max(1, passes_done),
+                                flags=flags) as render:
+                self._poll(render, f"shadow catchers, {name}", lambda: None)
+                return {channel: render.read(channel) for channel in ("radiance", "alpha", *(["denoised"] if self._denoised else []))}
+
+    def _follow(self, render, depsgraph, crop, height, groups, show_tiles):
+        """Polls until the frame is done; hands tiles over as they finish. The library's last status."""
+        self._chosen = self._pass_list(depsgraph, groups, render.groups())
+        self._caught, self._tiles_shown = {}, 0.0
+
+        def show():
+            if show_tiles and not bpy.app.background and time.perf_counter() > self._tiles_shown + SHOW_SECONDS:
+                self._tiles_shown = time.perf_counter()
+                deadline = self._tiles_shown + 0.1
+                while time.perf_counter() < deadline and not self.is_stopped() and (tile := render.next_tile()) is not None:
+                    self._write(render, depsgraph, self._chosen, crop, tile, height)
+
+        return self._poll(render, "", show)
+
+    def _poll(self, render, name, show):
+        """Until it is done. `name`: of a render beside the frame's own, else empty; `show`: called while it runs."""
+        stopped = False
         while True:
             try:
                 status = render.wait(POLL_MS)
@@ -225,18 +264,16 @@ class LumicutEngine(bpy.types.RenderEngine):
             phase, fraction = (status.phase or b"").decode(), status.fraction
             if status.passes_total != 1:
                 phase, fraction = self._progress(status, phase)
+            if name:
+                phase, fraction = f"{name}: {phase}", status.tiles_done / max(1, status.tiles_total)
             self.say(phase, fraction)
             if status.state != library.RUNNING:
                 break
-            if show_tiles and not stopped and time.perf_counter() > tiles_shown + SHOW_SECONDS:
-                tiles_shown = time.perf_counter()
-                deadline = tiles_shown + 0.1
-                while time.perf_counter() < deadline and not self.is_stopped() and (tile := render.next_tile()) is not None:
-                    self._write(render, depsgraph, chosen, crop, tile, height)
+            if not stopped:
+                show()
         if self.is_stopped():
             raise Stopped
-        self._write(render, depsgraph, chosen, crop, crop, height)
-        self.update_progress(1.0)
+        return status
 
     def _progress(self, status, phase):
         """Text and share of a render of several passes."""
@@ -273,7 +310,8 @@ class LumicutEngine(bpy.types.RenderEngine):
         result = self.begin_result(x0 - crop[0], crop[3] - y1, x1 - x0, y1 - y0, layer=depsgraph.view_layer_eval.name, view=view)
         try:
             found = result.layers[0].passes
-            filler = passes.Filler(render, depsgraph.scene_eval, camera, tile, *(self._backdrop or ()), denoised=self._denoised)
+            filler = passes.Filler(render, depsgraph.scene_eval, camera, tile, *(self._backdrop or ()), denoised=self._denoised,
+                                   caught=self._caught, shadows_apart=passes.wants_shadows_apart(depsgraph.view_layer_eval))
             for name, source in [("Combined", "combined"), *chosen]:
                 target = found.get(name)
                 if target is not None and source is not None:

@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 
-from . import properties
+from . import properties, shadow_catcher
 from .lumicut import library
 
 FLAT_RECTS = bpy.app.version >= (4, 1, 0)
@@ -20,7 +20,7 @@ LEFT_OUT = {
     "use_pass_transmission_indirect": "Transmission Indirect", "use_pass_transmission_color": "Transmission Color",
     "use_pass_cryptomatte_object": "Cryptomatte Object", "use_pass_cryptomatte_material": "Cryptomatte Material",
     "use_pass_cryptomatte_asset": "Cryptomatte Asset", "use_pass_volume_direct": "Volume Direct",
-    "use_pass_volume_indirect": "Volume Indirect", "use_pass_shadow_catcher": "Shadow Catcher",
+    "use_pass_volume_indirect": "Volume Indirect",
 }
 
 
@@ -44,6 +44,10 @@ def wants_denoising(layer):
     return layer.lumicut.use_pass_denoising or of_cycles(layer, "denoising_store_passes", False)
 
 
+def wants_shadows_apart(layer):
+    return of_cycles(layer, "use_pass_shadow_catcher", False)
+
+
 def wanted(layer):
     """[(pass name, letters of its channels, kind, what fills it)] of a view layer, beside Combined and light groups.
     What fills it is a channel of the library or a method of Filler."""
@@ -54,6 +58,8 @@ def wanted(layer):
         chosen.append(("Normal", "XYZ", "VECTOR", "normal"))
     if getattr(layer, "use_pass_position", False):
         chosen.append(("Position", "XYZ", "VECTOR", "position"))
+    if wants_shadows_apart(layer):
+        chosen.append((shadow_catcher.PASS, "RGB", "COLOR", "shadow_catcher"))
     for channel, (name, prop, _, _, letters, kind) in properties.PASSES.items():
         if getattr(layer.lumicut, prop):
             chosen.append((name, letters, kind, channel))
@@ -111,13 +117,14 @@ def check_compositor(scene, layer):
 
 class Filler:
     """Pixels of one rectangle of a render. `camera`: a library.Camera. `backdrop(camera, tile)`: what it alone sees of the
-    world, which is in the light group of number `group`. `denoised`: Combined and Error are."""
+    world, which is in the light group of number `group`. `denoised`: Combined and Error are. `caught`: channels of the frames
+    that shadow catchers need, of this very rectangle; {}: there are none. `shadows_apart`: they have a pass of their own, as Cycles has it, not Combined."""
 
-    def __init__(self, render, scene, camera, tile, backdrop=None, group=0, denoised=False):
+    def __init__(self, render, scene, camera, tile, backdrop=None, group=0, denoised=False, caught=None, shadows_apart=False):
         self.render, self.scene, self.camera, self.tile = render, scene, camera, tile
         self._read, self._exposure, self._backdrop = {}, exposure(scene), backdrop
         self._with_backdrop = {"radiance", "denoised", "denoising_color", f"radiance.{group}"} if backdrop is not None else set()
-        self._denoised = denoised
+        self._denoised, self._caught, self._shadows_apart = denoised, caught, shadows_apart
         self.hit = self.channel("alpha") > 0
 
     def channel(self, name):
@@ -137,7 +144,29 @@ class Filler:
         return pixels if self._exposure == 1 else pixels * np.float32(self._exposure)
 
     def combined(self):
-        return self._image("denoised" if self._denoised else "radiance")
+        return self._image("denoised" if self._denoised else "radiance") if not self._caught else self._with_caught_shadows()
+
+    def shadow_catcher(self):
+        """What is left of the catchers' light; 1 elsewhere."""
+        if not self._caught:
+            return np.ones((*self.hit.shape[:2], 3), np.float32)
+        whole, objects, clean = self.channel("radiance"), self._caught["objects"]["radiance"], self._caught["clean"]["radiance"]
+        return shadow_catcher.shade(whole, objects, clean, 1 if "world" in self._caught else self.channel("alpha"))
+
+    def _with_caught_shadows(self):
+        objects = self._caught["objects"]
+        colour, alpha, opaque = objects["denoised" if self._denoised else "radiance"], objects["alpha"], \
+            not self.scene.render.film_transparent
+        behind = self._caught["world"]["radiance"] if "world" in self._caught else \
+            self._backdrop(self.camera, self.tile) if opaque and self._backdrop is not None else 0
+        if self._shadows_apart:  # the catchers are holes, to be laid over the pass of their shadows
+            missed = (1 - self.channel("alpha")) if opaque else 0
+            colour, alpha = colour + behind * missed, alpha + missed
+        else:
+            alpha = shadow_catcher.alpha(alpha, self.shadow_catcher())
+            if opaque:
+                colour, alpha = colour + behind * (1 - alpha), np.ones_like(alpha)
+        return np.concatenate([colour * np.float32(self._exposure), alpha], -1, dtype=np.float32)
 
     def noisy(self):
         return self._image("denoising_color")

@@ -38,6 +38,7 @@ class Mesh:
     mask: int = 0                        # library.RAYS that see it; 0: all
     attributes: list = dataclasses.field(default_factory=list)   # (number, library.OF_VERTICES ..., (places, components))
     of_instances: dict = dataclasses.field(default_factory=dict)  # number: values of each transform, for OF_INSTANCES
+    catcher: bool = False                # a shadow catcher [shadow_catcher.py]
 
     def all_attributes(self):
         return [*self.attributes, *((number, library.OF_INSTANCES, np.array(values, np.float32).reshape(len(values), -1))
@@ -116,6 +117,8 @@ class SceneData:
     transparent: bool = False  # whether the film is
     camera: library.Camera | None = None
     groups: list = dataclasses.field(default_factory=list)     # names of light groups, from number 1; 0: in none
+    added_lamps: set = dataclasses.field(default_factory=set)  # names of those that do not shine where shadow catchers are alone
+    held_out: dict = dataclasses.field(default_factory=dict)   # where there are shadow catchers: the same material as a hole to the camera
 
     def triangles(self):
         return sum(len(mesh.indices) * len(mesh.transforms) for mesh in self.meshes)
