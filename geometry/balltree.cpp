@@ -373,43 +373,8 @@ size_t BallTree::depth() const {
   return deepest;
 }
 
-std::vector<uint32_t> BallTree::containing(std::span<const double> c, double radius) const {
-  check(c, radius, "the query");
-  std::vector<uint32_t> found, stack;
-  if (root_ != kNone) stack.push_back(root_);
-  while (!stack.empty()) {
-    const uint32_t i = stack.back();
-    const Node& n = nodes_[i];
-    stack.pop_back();
-    if (distance(centre(i), c.data()) + radius > n.radius) continue;
-    if (n.leaf != kNone)
-      found.push_back(n.leaf);
-    else
-      stack.push_back(n.left), stack.push_back(n.right);
-  }
-  std::sort(found.begin(), found.end());
-  return found;
-}
-
-std::vector<uint32_t> BallTree::intersecting(std::span<const double> c, double radius) const {
-  check(c, radius, "the query");
-  std::vector<uint32_t> found, stack;
-  if (root_ != kNone) stack.push_back(root_);
-  while (!stack.empty()) {
-    const uint32_t i = stack.back();
-    const Node& n = nodes_[i];
-    stack.pop_back();
-    if (distance(centre(i), c.data()) > radius + n.radius) continue;
-    if (n.leaf != kNone)
-      found.push_back(n.leaf);
-    else
-      stack.push_back(n.left), stack.push_back(n.right);
-  }
-  std::sort(found.begin(), found.end());
-  return found;
-}
-
-std::vector<uint32_t> BallTree::contained(std::span<const double> c, double radius) const {
+template <typename Enters, typename Takes>
+std::vector<uint32_t> BallTree::search(std::span<const double> c, double radius, Enters enters, Takes takes) const {
   check(c, radius, "the query");
   std::vector<uint32_t> found, stack;
   if (root_ != kNone) stack.push_back(root_);
@@ -419,13 +384,29 @@ std::vector<uint32_t> BallTree::contained(std::span<const double> c, double radi
     stack.pop_back();
     const double d = distance(centre(i), c.data());
     if (n.leaf != kNone) {
-      if (d + n.radius <= radius) found.push_back(n.leaf);
-    } else if (d <= radius + n.radius) {
+      if (takes(d, n.radius)) found.push_back(n.leaf);
+    } else if (enters(d, n.radius)) {
       stack.push_back(n.left), stack.push_back(n.right);
     }
   }
   std::sort(found.begin(), found.end());
   return found;
+}
+
+std::vector<uint32_t> BallTree::containing(std::span<const double> c, double radius) const {
+  const auto contains = [radius](double d, double r) { return d + radius <= r; };
+  return search(c, radius, contains, contains);
+}
+
+std::vector<uint32_t> BallTree::intersecting(std::span<const double> c, double radius) const {
+  const auto meets = [radius](double d, double r) { return d <= radius + r; };
+  return search(c, radius, meets, meets);
+}
+
+std::vector<uint32_t> BallTree::contained(std::span<const double> c, double radius) const {
+  return search(
+      c, radius, [radius](double d, double r) { return d <= radius + r; },
+      [radius](double d, double r) { return d + r <= radius; });
 }
 
 std::vector<uint32_t> BallTree::nearest(std::span<const double> p, size_t m) const {

@@ -66,6 +66,9 @@ class BallTree {
   double volume(double radius) const;
   double joint_radius(uint32_t node, const double* centre, double radius) const;
   void check(std::span<const double> centre, double radius, const char* what) const;
+  // The leaves that takes(distance of centres, radius) takes, in order, below nodes that enters() lets in.
+  template <typename Enters, typename Takes>
+  std::vector<uint32_t> search(std::span<const double> centre, double radius, Enters enters, Takes takes) const;
   uint32_t new_node();
   uint32_t new_leaf(const double* centre, double radius);
   uint32_t join(uint32_t left, uint32_t right);  // a new inner node

@@ -2,8 +2,6 @@
 // [Wald 2007, On fast Construction of SAH-based Bounding Volume Hierarchies]
 // Departs: bins on all three axes or on the longest only, and optionally subtrees of few primitives are built by
 // agglomeration. One primitive per leaf: collapse() decides about larger leaves.
-#include <tbb/parallel_invoke.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -54,19 +52,7 @@ class BinnedBuilder {
       }
       const size_t middle = split(begin, end, centres);
       node.first = at.free, node.count = 0;
-      const auto [left, right] = children_of(at, middle - begin);
-      if (n > kTaskPrimitives) {
-        tbb::parallel_invoke([&, l = left] { build(begin, middle, l); }, [&, r = right] { build(middle, end, r); });
-        return;
-      }
-      // Recursion into the smaller half only: the stack stays below log2(n) frames.
-      if (middle - begin <= end - middle) {
-        build(begin, middle, left);
-        begin = middle, at = right;
-      } else {
-        build(middle, end, right);
-        end = middle, at = left;
-      }
+      if (!build_halves(begin, middle, end, at, [&](size_t b, size_t e, SubtreeSlots s) { build(b, e, s); })) return;
     }
   }
 

@@ -2,6 +2,8 @@
 // the caller, for N >= 2 boxes.
 #pragma once
 
+#include <tbb/parallel_invoke.h>
+
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -34,6 +36,25 @@ struct SubtreeSlots {
 inline std::pair<SubtreeSlots, SubtreeSlots> children_of(const SubtreeSlots& at, size_t left_count) {
   const auto n = static_cast<uint32_t>(left_count);
   return {{at.free, at.free + 2, at.first}, {at.free + 1, at.free + 2 * n, at.first + n}};
+}
+
+// Builds both halves of primitives [begin, end) and returns false; or the smaller one alone, and narrows the range and
+// its slots to the other for a loop to go on with, so that the stack stays below log2(n) frames.
+template <typename Build>
+bool build_halves(size_t& begin, size_t middle, size_t& end, SubtreeSlots& at, Build build) {
+  const auto [left, right] = children_of(at, middle - begin);
+  if (end - begin > kTaskPrimitives) {
+    tbb::parallel_invoke([&, l = left] { build(begin, middle, l); }, [&, r = right] { build(middle, end, r); });
+    return false;
+  }
+  if (middle - begin <= end - middle) {
+    build(begin, middle, left);
+    begin = middle, at = right;
+  } else {
+    build(middle, end, right);
+    end = middle, at = left;
+  }
+  return true;
 }
 
 // binned_builder.cpp. `all_axes`: false for the longest axis only. `agglomerate_up_to`: subtrees of at most this many

@@ -1,8 +1,6 @@
 // Top-down builder: the surface area heuristic over all splits of the centres' order on three axes.
 // [Wald, Boulos and Shirley 2007, Ray Tracing Deformable Scenes Using Dynamic Bounding Volume Hierarchies]
 // Departs: the orders are sorted once and kept sorted by stable partitions, in linear time per level.
-#include <tbb/parallel_invoke.h>
-
 #include <algorithm>
 #include <limits>
 #include <numeric>
@@ -77,18 +75,7 @@ class SweepBuilder {
                   order.begin() + static_cast<ptrdiff_t>(begin));
       }
       node.first = at.free, node.count = 0;
-      const auto [left, right] = children_of(at, middle - begin);
-      if (n > kTaskPrimitives) {
-        tbb::parallel_invoke([&, l = left] { build(begin, middle, l); }, [&, r = right] { build(middle, end, r); });
-        return;
-      }
-      if (middle - begin <= end - middle) {
-        build(begin, middle, left);
-        begin = middle, at = right;
-      } else {
-        build(middle, end, right);
-        end = middle, at = left;
-      }
+      if (!build_halves(begin, middle, end, at, [&](size_t b, size_t e, SubtreeSlots s) { build(b, e, s); })) return;
     }
   }
 

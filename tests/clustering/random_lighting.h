@@ -86,6 +86,13 @@ inline Vpl random_light(Rng& rng, VplKind kind, float half) {
   return v;
 }
 
+inline std::vector<Vpl> mixed_lights(size_t n) {
+  std::vector<Vpl> lights;
+  Rng rng(5, Stage::test);
+  for (size_t i = 0; i < n; ++i) lights.push_back(random_light(rng, static_cast<VplKind>(rng.next_below(4)), 2.0f));
+  return lights;
+}
+
 // Lights gathered around a place and a direction, from tight to everywhere.
 inline std::vector<Vpl> random_cluster(Rng& rng, VplKind kind, size_t n) {
   const Vec3f center = random_point(rng, 1.5f), axis = random_direction(rng);

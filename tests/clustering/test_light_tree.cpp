@@ -13,14 +13,6 @@ namespace lumicut {
 
 namespace {
 
-std::vector<Vpl> mixed_lights(size_t n) {
-  std::vector<Vpl> lights;
-  Rng rng(5, Stage::test);
-  for (size_t i = 0; i < n; ++i)
-    lights.push_back(test::random_light(rng, static_cast<VplKind>(rng.next_below(4)), 2.0f));
-  return lights;
-}
-
 void check_tree(const LightTree& tree, const std::vector<Vpl>& lights) {
   ASSERT_EQ(tree.lights().size(), lights.size());
   std::set<uint32_t> seen;
@@ -56,7 +48,7 @@ void check_tree(const LightTree& tree, const std::vector<Vpl>& lights) {
 }  // namespace
 
 TEST(LightTree, HoldsEveryLightOnceInATreeOfItsKind) {
-  const auto lights = mixed_lights(3000);
+  const auto lights = test::mixed_lights(3000);
   for (auto method :
        {LightTree::Method::agglomerative, LightTree::Method::divisive_3d, LightTree::Method::divisive_6d}) {
     Progress progress;
@@ -94,7 +86,7 @@ TEST(LightTree, RepresentativesAreDrawnByIntensity) {
 }
 
 TEST(LightTree, IsTheSameOnOneAndFourThreads) {
-  const auto lights = mixed_lights(20000);
+  const auto lights = test::mixed_lights(20000);
   std::vector<LightNode> first;
   for (int threads : {1, 4}) {
     Arena arena(threads);
@@ -126,7 +118,7 @@ TEST(LightTree, DegenerateInputBuilds) {
 }
 
 TEST(LightTree, StopsWhenCancelled) {
-  const auto lights = mixed_lights(5000);
+  const auto lights = test::mixed_lights(5000);
   Progress progress;
   progress.cancel();
   EXPECT_THROW(LightTree::build(lights, {}, progress), Error);

@@ -150,17 +150,11 @@ TEST(IlluminationCut, DegenerateInputIsNoTrouble) {
   const auto scene = test::make_room();
   const auto none = test::render(*scene, kId, VplSet{}, {}, {.width = 16, .height = 16});
   for (const Rgb& c : none.radiance) EXPECT_TRUE(is_finite(c));
-  VplSet one;
-  one.lights.resize(1);
-  one.lights[0].position = {0, -0.5f, 0.8f};
-  one.lights[0].intensity = {1, 1, 1};
+  const VplSet one = test::light_in_parts(1), many = test::light_in_parts(200000);
   const auto single = test::render(*scene, kId, one, {}, {.width = 16, .height = 16});
   EXPECT_LT(test::mean_relative_error(
                 single.radiance, test::render(*scene, "exhaustive", one, {}, {.width = 16, .height = 16}).radiance),
             1e-6);
-  VplSet many;
-  many.lights.assign(200000, one.lights[0]);
-  for (Vpl& v : many.lights) v.intensity = Rgb{1, 1, 1} * (1 / 200000.0f);
   const auto coincident = test::render(*scene, kId, many, {}, {.width = 16, .height = 16});
   // Hundreds of thousands of summands in single precision.
   EXPECT_LT(test::mean_relative_error(coincident.radiance, single.radiance), 2e-3);
@@ -168,23 +162,7 @@ TEST(IlluminationCut, DegenerateInputIsNoTrouble) {
 
 TEST(IlluminationCut, IsCancelledAndTakesNoPoints) {
   const auto scene = test::make_room();
-  const VplSet vpls = test::standing_lights_of(*scene, 1000);
-  const IntegratorEntry* entry = find_integrator(kId);
-  const Params params(all_params(*entry));
-  Progress progress;
-  Stats stats;
-  const auto integrator = entry->create();
-  integrator->prepare(*scene, vpls, params, {progress, stats});
-  ShadePoints points;
-  points.finish();
-  integrator->shade(points, {}, {}, {progress, stats});
-  SurfacePoint p;
-  p.position = {0, 0, 0.9f}, p.normal = p.mirror = {0, 0, -1};
-  for (int i = 0; i < 500; ++i) points.push(p);
-  points.finish();
-  std::vector<Rgb> radiance(points.size());
-  progress.cancel();
-  EXPECT_THROW(integrator->shade(points, radiance, {}, {progress, stats}), Error);
+  test::expect_no_points_and_cancel(kId, *scene, test::standing_lights_of(*scene, 1000), 1);
 }
 
 }  // namespace lumicut

@@ -98,17 +98,7 @@ TEST(ColumnMethods, DegenerateLightsAreNoTrouble) {
 
 TEST(ColumnMethods, EveryKindOfLightIsClustered) {
   const auto scene = test::make_room();
-  Rng rng(3, Stage::test);
-  VplSet vpls;
-  for (int i = 0; i < 2000; ++i) {
-    Vpl v;
-    v.kind = static_cast<VplKind>(i % 4);
-    v.position = test::random_point(rng, 0.9f);
-    v.normal = v.kind == VplKind::omni ? Vec3f{} : test::random_direction(rng);
-    v.intensity = {rng.next_float(), rng.next_float(), rng.next_float()};
-    if (v.kind == VplKind::spot) v.cos_outer() = 0.3f, v.blend_cosine = 0.2f;
-    vpls.lights.push_back(v);
-  }
+  const VplSet vpls = test::lights_of_every_kind(2000);
   const auto reference = test::render(*scene, "exhaustive", vpls, {});
   for (const char* id : kMethods) {
     const auto frame = test::render(*scene, id, vpls, {{"columns", "800"}});

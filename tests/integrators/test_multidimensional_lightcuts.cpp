@@ -85,43 +85,21 @@ TEST(MultidimensionalLightcuts, DegenerateInputIsNoTrouble) {
   const auto scene = test::make_room();
   const auto none = test::render(*scene, kId, VplSet{}, {}, {.width = 16, .height = 16, .samples = 4});
   for (const Rgb& c : none.radiance) EXPECT_TRUE(is_finite(c));
-  VplSet one;
-  one.lights.resize(1);
-  one.lights[0].position = {0, -0.5f, 0.8f};
-  one.lights[0].intensity = {1, 1, 1};
+  const VplSet one = test::light_in_parts(1), many = test::light_in_parts(20000);
   const auto single = test::render(*scene, kId, one, {{"error", "0"}}, {.width = 16, .height = 16, .samples = 4});
   EXPECT_LT(test::mean_relative_error(
                 single.radiance,
                 test::render(*scene, "exhaustive", one, {}, {.width = 16, .height = 16, .samples = 4}).radiance),
             1e-6);
-  VplSet many;
-  many.lights.assign(20000, one.lights[0]);
-  for (Vpl& v : many.lights) v.intensity = Rgb{1, 1, 1} * (1 / 20000.0f);
   const auto coincident = test::render(*scene, kId, many, {}, {.width = 16, .height = 16}),
              whole = test::render(*scene, kId, one, {}, {.width = 16, .height = 16});
   // 20,000 summands in single precision.
   EXPECT_LT(test::mean_relative_error(coincident.radiance, whole.radiance), 1e-3);
 }
 
-TEST(MultidimensionalLightcuts, IsCancelled) {
+TEST(MultidimensionalLightcuts, IsCancelledAndTakesNoPoints) {
   const auto scene = test::make_room();
-  const VplSet vpls = test::standing_lights_of(*scene, 500);
-  const IntegratorEntry* entry = find_integrator(kId);
-  const Params params(all_params(*entry));
-  Progress progress;
-  Stats stats;
-  const auto integrator = entry->create();
-  integrator->prepare(*scene, vpls, params, {progress, stats});
-  ShadePoints points;
-  points.finish();
-  integrator->shade(points, {}, {}, {progress, stats});  // no points
-  SurfacePoint p;
-  p.position = {0, 0, 0.9f}, p.normal = p.mirror = {0, 0, -1};
-  for (uint32_t i = 0; i < 300; ++i) p.pixel = i / 3, points.push(p);
-  points.finish();
-  std::vector<Rgb> radiance(points.size());
-  progress.cancel();
-  EXPECT_THROW(integrator->shade(points, radiance, {}, {progress, stats}), Error);
+  test::expect_no_points_and_cancel(kId, *scene, test::standing_lights_of(*scene, 500), 3);
 }
 
 }  // namespace lumicut

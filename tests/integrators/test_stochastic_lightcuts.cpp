@@ -6,25 +6,6 @@
 
 namespace lumicut {
 
-namespace {
-
-VplSet lights_of_every_kind(int count) {
-  Rng rng(3, Stage::test);
-  VplSet vpls;
-  for (int i = 0; i < count; ++i) {
-    Vpl v;
-    v.kind = static_cast<VplKind>(i % 4);
-    v.position = test::random_point(rng, 0.9f);
-    v.normal = v.kind == VplKind::omni ? Vec3f{} : test::random_direction(rng);
-    v.intensity = {rng.next_float(), rng.next_float(), rng.next_float()};
-    if (v.kind == VplKind::spot) v.cos_outer() = 0.3f, v.blend_cosine = 0.2f;
-    vpls.lights.push_back(v);
-  }
-  return vpls;
-}
-
-}  // namespace
-
 TEST(StochasticLightcuts, EqualsExhaustiveWithACutOfAllLights) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 1500);
@@ -38,7 +19,7 @@ TEST(StochasticLightcuts, MeanOverSeedsIsTheExhaustiveSumForEveryKindOfLight) {
   // seeds Student's t leaves 9 pixels in 100,000 outside by chance; deviations of few rare bright draws are
   // underestimated, so 5 in 1000 are allowed. A bias of 1 % moves the whole image's mean by many of its deviations.
   const auto scene = test::make_room();
-  for (const VplSet& vpls : {test::lights_of(*scene, 1000), lights_of_every_kind(400)}) {
+  for (const VplSet& vpls : {test::lights_of(*scene, 1000), test::lights_of_every_kind(400)}) {
     const auto reference = test::render(*scene, "exhaustive", vpls, {}, {.width = 24, .height = 16});
     const size_t n = reference.radiance.size();
     constexpr int kSeeds = 200;

@@ -28,14 +28,6 @@ std::vector<Vpl> wall_lights(size_t n) {
   return lights;
 }
 
-std::vector<Vpl> mixed_lights(size_t n) {
-  std::vector<Vpl> lights;
-  Rng rng(5, Stage::test);
-  for (size_t i = 0; i < n; ++i)
-    lights.push_back(test::random_light(rng, static_cast<VplKind>(rng.next_below(4)), 2.0f));
-  return lights;
-}
-
 WspdTree build(const std::vector<Vpl>& lights, float separation = 0.25f, const Accel* accel = nullptr) {
   Progress progress;
   WspdTree::Options options;
@@ -67,7 +59,7 @@ double total(std::span<const Vpl> lights) {
 }  // namespace
 
 TEST(WspdTree, ChildrenPartitionTheirParentAndBallsHoldTheirLights) {
-  const auto lights = mixed_lights(3000);
+  const auto lights = test::mixed_lights(3000);
   const WspdTree tree = build(lights);
   ASSERT_EQ(tree.lights().size(), lights.size());
   EXPECT_NEAR(total(tree.lights()), total(lights), 1e-3 * total(lights));
@@ -133,7 +125,7 @@ TEST(WspdTree, NearLeafIsTheLightItselfAndNearElsewhere) {
 }
 
 TEST(WspdTree, SubgroupsHoldTheIntensityAndTheThreshold) {
-  const auto lights = mixed_lights(2000);
+  const auto lights = test::mixed_lights(2000);
   const WspdTree tree = build(lights);
   size_t several = 0;
   for (const WspdNode& n : tree.nodes()) {
@@ -191,7 +183,7 @@ TEST(WspdTree, LocalVisibilitySeesTheWallInsideACluster) {
 }
 
 TEST(WspdTree, SameTreeOnOneAndFourThreads) {
-  const auto lights = mixed_lights(5000);
+  const auto lights = test::mixed_lights(5000);
   std::vector<uint8_t> one, four;
   Arena(1).run([&] { build(lights).save(one); });
   Arena(4).run([&] { build(lights).save(four); });
@@ -199,7 +191,7 @@ TEST(WspdTree, SameTreeOnOneAndFourThreads) {
 }
 
 TEST(WspdTree, SavedTreesComeBackAndDamageIsFound) {
-  const WspdTree tree = build(mixed_lights(500));
+  const WspdTree tree = build(test::mixed_lights(500));
   std::vector<uint8_t> bytes, again;
   tree.save(bytes);
   WspdTree::load(bytes, test::random_profiles()).save(again);
@@ -227,7 +219,7 @@ TEST(WspdTree, SavedTreesComeBackAndDamageIsFound) {
 
 TEST(WspdTree, NumbersThatAreNoneAreRefused) {
   std::vector<uint8_t> bytes;
-  build(mixed_lights(50)).save(bytes);
+  build(test::mixed_lights(50)).save(bytes);
   // The cube's corner, side and shift come first: by them a place chooses its cell.
   constexpr size_t kCube = 5 * sizeof(double);
   for (size_t at = 0; at < kCube; at += sizeof(float)) {

@@ -9,6 +9,13 @@
 namespace lumicut::io {
 namespace {
 
+void write_white(const std::string& path) {
+  Image image;
+  image.width = 2, image.height = 1;
+  image.layers = {{"radiance", 3, {1, 1, 1, 1, 1, 1}}};
+  write_exr(path, image, false);
+}
+
 using nlohmann::json;
 
 const char kScene[] = R"({
@@ -192,10 +199,7 @@ TEST(SceneJson, TheEnvironmentMayHaveARotationOfItsOwnAndBeHidden) {
 
 TEST(SceneJson, ColoursThatMultiplyATextureMayBeAboveOne) {
   const TemporaryFolder folder;
-  Image image;
-  image.width = 2, image.height = 1;
-  image.layers = {{"radiance", 3, {1, 1, 1, 1, 1, 1}}};
-  write_exr(folder / "a.exr", image, false);
+  write_white(folder / "a.exr");
   json scene = json::parse(kScene);
   const size_t first = scene["materials"].size();
   scene["materials"].push_back({{"name", "paper"}, {"diffuse", {1.5, 1, 1}}, {"diffuse_texture", "a.exr"}});
@@ -208,10 +212,7 @@ TEST(SceneJson, ColoursThatMultiplyATextureMayBeAboveOne) {
 
 TEST(SceneJson, ATextureMaySayThatItEndsAndIsNotFiltered) {
   const TemporaryFolder folder;
-  Image image;
-  image.width = 2, image.height = 1;
-  image.layers = {{"radiance", 3, {1, 1, 1, 1, 1, 1}}};
-  write_exr(folder / "a.exr", image, false);
+  write_white(folder / "a.exr");
   json scene = json::parse(kScene);
   const size_t first = scene["materials"].size();
   scene["materials"].push_back({{"name", "ends"}, {"diffuse_texture", {{"file", "a.exr"}, {"clamp", true}}}});

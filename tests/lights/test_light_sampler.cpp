@@ -300,12 +300,7 @@ TEST(LightSampler, AVeilOfLightHasTheShareOfPowerThatRaysMeet) {
     Scene scene{{}};
     Material m;
     m.emission = {2, 2, 2}, m.opacity = opacity;
-    scene.set_materials({m});
-    Mesh mesh;
-    test::add_quad(mesh, {0, 0, 0}, {2, 0, 0}, {2, 3, 0}, {0, 3, 0}, 0);
-    scene.add_mesh(mesh);
-    Progress progress;
-    scene.commit(progress);
+    test::commit_quad(scene, m, {0, 0, 0}, {2, 0, 0}, {2, 3, 0}, {0, 3, 0});
     return mean_flux(scene, 10);
   };
   EXPECT_NEAR(flux(1.0f), kPi * 6 * 2, 1e-4);  // rounding only
@@ -318,12 +313,7 @@ TEST(LightSampler, EmissiveTrianglesShineFromTheirFrontUnlessToldOtherwise) {
     Material m;
     m.emission = {1, 1, 1};
     m.emit_both_sides = both;
-    scene.set_materials({m});
-    Mesh mesh;
-    test::add_quad(mesh, {0, 0, 0}, {2, 0, 0}, {2, 1, 0}, {0, 1, 0}, 0);
-    scene.add_mesh(mesh);
-    Progress progress;
-    scene.commit(progress);
+    test::commit_quad(scene, m, {0, 0, 0}, {2, 0, 0}, {2, 1, 0}, {0, 1, 0});
     EXPECT_NEAR(mean_flux(scene, 1000), kPi * 2 * (both ? 2 : 1), 1e-3);
     const LightSampler emitters(scene);
     int back = 0;

@@ -99,14 +99,22 @@ TEST(Passes, ACheckpointOfAnythingElseIsRefusedByName) {
   EXPECT_NE(refusal({1, 2, 3}, 48).find("too short"), std::string::npos);
 }
 
-TEST(Passes, ATargetStopsWhenTheErrorIsReached) {
+namespace {
+// How a render of noisy iterations ends.
+lumicut_status end_of(const lumicut_render_desc& frame, bool compensate = false) {
   const api::Device device(2);
   const api::Scene s = scene(device);
   const api::Integrator i = integrator(device, 60);
+  EXPECT_EQ(lumicut_integrator_set(i.get(), "compensate", compensate ? "true" : "false"), LUMICUT_OK);
+  const api::Render r(i, s, frame);
+  return r.wait();
+}
+}  // namespace
+
+TEST(Passes, ATargetStopsWhenTheErrorIsReached) {
   auto f = passes_of(0);
   f.target_error = 0.5f;
-  const api::Render r(i, s, f);
-  const auto status = r.wait();
+  const auto status = end_of(f);
   EXPECT_EQ(status.state, LUMICUT_DONE);
   EXPECT_GE(status.passes_done, 8u);
   EXPECT_LE(status.error, 0.5);
@@ -114,26 +122,15 @@ TEST(Passes, ATargetStopsWhenTheErrorIsReached) {
 }
 
 TEST(Passes, MorePassesTellTheErrorToMoreThanTheRootOfTheirNumber) {
-  const api::Device device(2);
-  const api::Scene s = scene(device);
-  const api::Integrator i = integrator(device, 60);
-  ASSERT_EQ(lumicut_integrator_set(i.get(), "compensate", "true"), LUMICUT_OK);
-  const auto error = [&](uint32_t n) {
-    const api::Render r(i, s, passes_of(n));
-    return r.wait().error;
-  };
+  const auto error = [](uint32_t n) { return end_of(passes_of(n), true).error; };
   // Halved by four times as many passes, within what Student's t at 8 and the chance of a quantile allow.
   EXPECT_NEAR(error(32) / error(8), 0.5, 0.15);
 }
 
 TEST(Passes, SecondsStopARenderThatHasNoOtherEnd) {
-  const api::Device device(2);
-  const api::Scene s = scene(device);
-  const api::Integrator i = integrator(device, 60);
   auto f = passes_of(0);
   f.max_seconds = 0.2f;
-  const api::Render r(i, s, f);
-  const auto status = r.wait();
+  const auto status = end_of(f);
   EXPECT_EQ(status.state, LUMICUT_DONE);
   EXPECT_GE(status.passes_done, 1u);
   EXPECT_EQ(status.passes_total, 0u);

@@ -1,5 +1,6 @@
 // Level 2: what a scene takes, keeps, and gives back after an error.
 #include <cstring>
+#include <functional>
 
 #include "box_scene.h"
 #include "tests/support/backends.h"
@@ -160,7 +161,10 @@ TEST(Scene, WithoutLightsItIsBlack) {
   EXPECT_EQ(mean(render(integrator(device, 10), s)), 0.0);
 }
 
-TEST(Scene, TexturesAreCopiedAndMultiplyTheColour) {
+namespace {
+// A diffuse_texture that is `texture` darkens red by half as a diffuse of half as much red does.
+void expect_half_of_red(
+    const lumicut_texture& texture, const std::function<void()>& after = [] {}) {
   const api::Device device(2);
   const api::Integrator i = integrator(device);
   api::Scene s = scene(device);
@@ -172,29 +176,25 @@ TEST(Scene, TexturesAreCopiedAndMultiplyTheColour) {
 
   m = materials();
   for (auto& each : m) each.diffuse_texture = 1;
-  std::vector<float> pixels = {0.5f, 1, 1, 0.5f, 1, 1};
-  auto t = make<lumicut_texture>();
-  t.width = 2, t.height = 1, t.channels = 3, t.format = LUMICUT_FLOAT32, t.pixels = pixels.data();
-  s.set_textures({t});
+  s.set_textures({texture});
   s.set_materials(m);
-  pixels.assign(6, 0.0f);
+  after();
   s.commit();
   const auto textured = render(i, s);
   // The same but for the order of two multiplications.
   ASSERT_EQ(textured.size(), expected.size());
   for (size_t k = 0; k < textured.size(); ++k) ASSERT_NEAR(textured[k], expected[k], 1e-4f + 1e-4f * expected[k]);
 }
+}  // namespace
+
+TEST(Scene, TexturesAreCopiedAndMultiplyTheColour) {
+  std::vector<float> pixels = {0.5f, 1, 1, 0.5f, 1, 1};
+  auto t = make<lumicut_texture>();
+  t.width = 2, t.height = 1, t.channels = 3, t.format = LUMICUT_FLOAT32, t.pixels = pixels.data();
+  expect_half_of_red(t, [&] { pixels.assign(6, 0.0f); });
+}
 
 TEST(Scene, AProgramOfAConstantIsThatFactor) {
-  const api::Device device(2);
-  const api::Integrator i = integrator(device);
-  api::Scene s = scene(device);
-  auto m = materials();
-  for (auto& each : m) each.diffuse[0] *= 0.5f;
-  s.set_materials(m);
-  s.commit();
-  const auto expected = render(i, s);
-
   const float constant[3] = {0.5f, 1, 1};
   lumicut_instruction sum{};
   sum.op = LUMICUT_OP_CLAMP, sum.inputs[0] = sum.inputs[1] = sum.inputs[2] = -1;
@@ -203,13 +203,7 @@ TEST(Scene, AProgramOfAConstantIsThatFactor) {
   program.instructions = &sum, program.constants = constant;
   auto t = make<lumicut_texture>();
   t.program = &program;
-  s.set_textures({t});
-  m = materials();
-  for (auto& each : m) each.diffuse_texture = 1;
-  s.set_materials(m);
-  s.commit();
-  const auto programmed = render(i, s);
-  for (size_t k = 0; k < programmed.size(); ++k) ASSERT_NEAR(programmed[k], expected[k], 1e-4f + 1e-4f * expected[k]);
+  expect_half_of_red(t);
 }
 
 // What is told in the camera's terms is another surface to another camera: lights are traced again.

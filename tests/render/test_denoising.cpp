@@ -26,12 +26,7 @@ std::unique_ptr<Scene> room(const Material& panel, uint32_t green_mask = 0xfffff
                  {0.99f, -0.97f, -0.99f}, 2);
   behind.mask = green_mask;
   scene->add_mesh(std::move(behind));
-  Camera camera;
-  camera.position = {0, -0.95f, 0.1f};
-  camera.right = {1, 0, 0}, camera.forward = {0, 1, 0}, camera.up = {0, 0, 1}, camera.tan_half_fov_y = 0.3f;
-  scene->set_camera(camera);
-  Progress progress;
-  scene->commit(progress);
+  test::commit_seen_from(*scene, {0, -0.95f, 0.1f}, 0.3f);
   return scene;
 }
 

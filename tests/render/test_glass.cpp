@@ -111,12 +111,7 @@ TEST(Mirror, OfOneSampleHasNoBlackPixel) {
   Light lamp;
   lamp.type = LightType::point, lamp.position = {0.3f, -0.5f, 0.6f}, lamp.value = {1, 1, 1};
   scene->set_lights({lamp});
-  Camera camera;
-  camera.position = {0, -0.9f, 0.1f};
-  camera.right = {1, 0, 0}, camera.forward = {0, 1, 0}, camera.up = {0, 0, 1}, camera.tan_half_fov_y = 0.4f;
-  scene->set_camera(camera);
-  Progress progress;
-  scene->commit(progress);
+  test::commit_seen_from(*scene, {0, -0.9f, 0.1f}, 0.4f);
   for (const Rgb& c : test::render(*scene, "exhaustive", test::lights_of(*scene, 100), {}).radiance)
     EXPECT_GT(luminance(c), 0.001f);
 }

@@ -22,12 +22,7 @@ std::unique_ptr<Scene> room(const std::function<void(Scene&)>& add, const std::s
   test::add_quad(mesh, {-0.3f, 0.3f, 0.98f}, {0.3f, 0.3f, 0.98f}, {0.3f, -0.3f, 0.98f}, {-0.3f, -0.3f, 0.98f}, 1);
   scene->add_mesh(std::move(mesh));
   if (add) add(*scene);
-  Camera camera;
-  camera.position = {0, -0.95f, 0.1f};
-  camera.right = {1, 0, 0}, camera.forward = {0, 1, 0}, camera.up = {0, 0, 1}, camera.tan_half_fov_y = 0.8f;
-  scene->set_camera(camera);
-  Progress progress;
-  scene->commit(progress);
+  test::commit_seen_from(*scene, {0, -0.95f, 0.1f}, 0.8f);
   return scene;
 }
 

@@ -110,12 +110,7 @@ TEST(Scene, WhatIsPartlyTransparentStopsItsShareOfTheRays) {
     Scene scene{{.accel = kind}};
     Material m;
     m.opacity = 0.3f;
-    scene.set_materials({m});
-    Mesh mesh;
-    test::add_quad(mesh, {0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, 0);
-    scene.add_mesh(mesh);
-    Progress progress;
-    scene.commit(progress);
+    test::commit_quad(scene, m, {0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0});
     constexpr int kSide = 200;
     int stopped = 0;
     for (int i = 0; i < kSide * kSide; ++i) {

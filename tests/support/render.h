@@ -1,6 +1,8 @@
 // Renders by the loop that hosts drive too, and measures images against each other.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include "core/parallel.h"
 #include "lights/trace_vpls.h"
 #include "render/render_loop.h"
@@ -77,6 +79,52 @@ inline Image render(const Scene& scene, const std::string& id, const VplSet& vpl
   });
   image.counters = stats.counters();
   return image;
+}
+
+inline VplSet lights_of_every_kind(int count) {
+  Rng rng(3, Stage::test);
+  VplSet vpls;
+  for (int i = 0; i < count; ++i) {
+    Vpl v;
+    v.kind = static_cast<VplKind>(i % 4);
+    v.position = random_point(rng, 0.9f);
+    v.normal = v.kind == VplKind::omni ? Vec3f{} : random_direction(rng);
+    v.intensity = {rng.next_float(), rng.next_float(), rng.next_float()};
+    if (v.kind == VplKind::spot) v.cos_outer() = 0.3f, v.blend_cosine = 0.2f;
+    vpls.lights.push_back(v);
+  }
+  return vpls;
+}
+
+// Without points nothing is shaded, and with them a cancel is heard.
+inline void expect_no_points_and_cancel(const std::string& id, const Scene& scene, const VplSet& vpls,
+                                        uint32_t points_a_pixel) {
+  const IntegratorEntry* entry = find_integrator(id);
+  const Params params(all_params(*entry));
+  Progress progress;
+  Stats stats;
+  const auto integrator = entry->create();
+  integrator->prepare(scene, vpls, params, {progress, stats});
+  ShadePoints points;
+  points.finish();
+  integrator->shade(points, {}, {}, {progress, stats});
+  SurfacePoint p;
+  p.position = {0, 0, 0.9f}, p.normal = p.mirror = {0, 0, -1};
+  for (uint32_t i = 0; i < 500; ++i) p.pixel = i / points_a_pixel, points.push(p);
+  points.finish();
+  std::vector<Rgb> radiance(points.size());
+  progress.cancel();
+  EXPECT_THROW(integrator->shade(points, radiance, {}, {progress, stats}), Error);
+}
+
+// A light in the middle of a room, as `parts` at one place.
+inline VplSet light_in_parts(uint32_t parts) {
+  VplSet set;
+  Vpl v;
+  v.position = {0, -0.5f, 0.8f};
+  v.intensity = Rgb{1, 1, 1} * (1 / static_cast<float>(parts));
+  set.lights.assign(parts, v);
+  return set;
 }
 
 inline double mean_luminance(const std::vector<Rgb>& image) {

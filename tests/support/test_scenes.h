@@ -46,6 +46,27 @@ inline Material diffuse(float r, float g, float b) {
   return m;
 }
 
+// A quad of one material, and nothing else; committed.
+inline void commit_quad(Scene& scene, const Material& material, Vec3f a, Vec3f b, Vec3f c, Vec3f d) {
+  scene.set_materials({material});
+  Mesh mesh;
+  add_quad(mesh, a, b, c, d, 0);
+  scene.add_mesh(mesh);
+  Progress progress;
+  scene.commit(progress);
+}
+
+// Commits the scene with a camera that looks along y.
+inline void commit_seen_from(Scene& scene, Vec3f position, float tan_half_fov_y) {
+  Camera camera;
+  camera.position = position;
+  camera.right = {1, 0, 0}, camera.forward = {0, 1, 0}, camera.up = {0, 0, 1};
+  camera.tan_half_fov_y = tan_half_fov_y;
+  scene.set_camera(camera);
+  Progress progress;
+  scene.commit(progress);
+}
+
 // A room of side 2 around the origin (times `scale`) with two blocks, a glossy floor, a coated wall, an upward area
 // light and a spot.
 inline std::unique_ptr<Scene> make_room(float scale = 1.0f, const std::string& accel = kDefaultAccel) {
