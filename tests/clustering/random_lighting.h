@@ -4,6 +4,7 @@
 #include <array>
 #include <memory>
 
+#include "clustering/light_tree.h"
 #include "lights/falloff.h"
 #include "lights/vpl.h"
 #include "tests/support/test_scenes.h"
@@ -90,6 +91,19 @@ inline std::vector<Vpl> mixed_lights(size_t n) {
   std::vector<Vpl> lights;
   Rng rng(5, Stage::test);
   for (size_t i = 0; i < n; ++i) lights.push_back(random_light(rng, static_cast<VplKind>(rng.next_below(4)), 2.0f));
+  return lights;
+}
+
+inline std::vector<uint32_t> lights_below(const LightTree& tree, uint32_t root) {
+  std::vector<uint32_t> lights, stack{root};
+  while (!stack.empty()) {
+    const LightNode& node = tree.node(stack.back());
+    stack.pop_back();
+    if (node.leaf())
+      lights.push_back(node.light);
+    else
+      stack.push_back(node.first_child), stack.push_back(node.first_child + 1);
+  }
   return lights;
 }
 

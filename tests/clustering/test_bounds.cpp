@@ -25,18 +25,10 @@ TEST(Bounds, AMillionRandomPairsNeverPassTheBoundOfTheirCluster) {
       float bounds[kLanes];
       light_node_bounds(node, block, bounds);
       // Leaves below this node: the worst light takes all of the node's intensity, as a representative would.
-      std::vector<uint32_t> stack{n};
-      while (!stack.empty()) {
-        const LightNode& below = tree.node(stack.back());
-        stack.pop_back();
-        if (!below.leaf()) {
-          stack.push_back(below.first_child);
-          stack.push_back(below.first_child + 1);
-          continue;
-        }
+      for (const uint32_t l : test::lights_below(tree, n)) {
         for (size_t i = 0; i < kLanes; ++i) {
-          const float value = luminance(
-              light_point(tree.lights()[below.light], node.intensity, Falloff(test::random_profiles()), points.get(i)));
+          const float value =
+              luminance(light_point(tree.lights()[l], node.intensity, Falloff(test::random_profiles()), points.get(i)));
           ASSERT_LE(value, bounds[i]) << "trial " << trial << " node " << n << " point " << i << " kind "
                                       << static_cast<int>(kind) << " glossy " << glossy;
           tight += value > 0.9f * bounds[i];

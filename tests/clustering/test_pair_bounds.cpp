@@ -58,16 +58,8 @@ TEST(PairBounds, AMillionRandomPairsNeverPassTheBoundOfTheirClusters) {
       float bounds[kLanes], distances2[kLanes];
       pair_bounds(node, nodes, bounds);
       pair_distances2(node, nodes, distances2);
-      std::vector<uint32_t> stack{n};
-      while (!stack.empty()) {
-        const LightNode& below = tree.node(stack.back());
-        stack.pop_back();
-        if (!below.leaf()) {
-          stack.push_back(below.first_child);
-          stack.push_back(below.first_child + 1);
-          continue;
-        }
-        const Vpl& light = tree.lights()[below.light];
+      for (const uint32_t l : test::lights_below(tree, n)) {
+        const Vpl& light = tree.lights()[l];
         for (size_t lane = 0; lane < used; ++lane) {
           for (size_t i = 0; i < clusters[lane].size(); ++i) {
             const SurfacePoint p = clusters[lane].get(i);

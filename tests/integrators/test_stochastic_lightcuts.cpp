@@ -103,37 +103,18 @@ TEST(StochasticLightcuts, DegenerateLightsAreNoTrouble) {
   const auto scene = test::make_room();
   for (const Rgb& c : test::render(*scene, "stochastic_lightcuts", {}, {}, {.width = 16, .height = 16}).radiance)
     EXPECT_EQ(c, Rgb{});
-  VplSet one;
-  one.lights.resize(1);
-  one.lights[0].position = {0, -0.5f, 0.8f};
-  one.lights[0].intensity = {1, 1, 1};
+  const VplSet one = test::light_in_parts(1), many = test::light_in_parts(200000);
   const auto reference = test::render(*scene, "exhaustive", one, {}, {.width = 16, .height = 16}),
              single = test::render(*scene, "stochastic_lightcuts", one, {}, {.width = 16, .height = 16});
   EXPECT_LT(test::mean_relative_error(single.radiance, reference.radiance), 1e-6);
-  VplSet many;
-  many.lights.assign(200000, one.lights[0]);
-  for (Vpl& v : many.lights) v.intensity = {5e-6f, 5e-6f, 5e-6f};
   const auto coincident = test::render(*scene, "stochastic_lightcuts", many, {}, {.width = 16, .height = 16});
   // Whatever is drawn gives the same; probabilities of 200,000 lights are rounded to floats.
   EXPECT_LT(test::mean_relative_error(coincident.radiance, reference.radiance), 1e-4);
 }
 
-TEST(StochasticLightcuts, CancelStopsIt) {
+TEST(StochasticLightcuts, IsCancelledAndTakesNoPoints) {
   const auto scene = test::make_room();
-  const VplSet vpls = test::standing_lights_of(*scene, 2000);
-  const auto integrator = find_integrator("stochastic_lightcuts")->create();
-  const Params params(all_params(*find_integrator("stochastic_lightcuts")));
-  Progress progress;
-  Stats stats;
-  integrator->prepare(*scene, vpls, params, {progress, stats});
-  ShadePoints points;
-  SurfacePoint p;
-  p.normal = {0, 0, 1}, p.mirror = {0, 0, 1}, p.diffuse = {0.3f, 0.3f, 0.3f};
-  points.push(p);
-  points.finish();
-  std::vector<Rgb> radiance(1);
-  progress.cancel();
-  EXPECT_THROW(integrator->shade(points, radiance, {}, {progress, stats}), Error);
+  test::expect_no_points_and_cancel("stochastic_lightcuts", *scene, test::standing_lights_of(*scene, 2000), 1);
 }
 
 }  // namespace lumicut

@@ -45,19 +45,22 @@ TEST(Passes, AnImageOfManyPassesIsTheSameOnAnyNumberOfThreads) {
   EXPECT_EQ(image(1), image(4));
 }
 
+namespace {
+std::vector<uint8_t> checkpoint_of_two(const api::Integrator& i, const api::Scene& s) {
+  auto f = passes_of(2);
+  f.flags = LUMICUT_CHECKPOINTS;
+  const api::Render r(i, s, f);
+  r.wait();
+  return checkpoint_of(r);
+}
+}  // namespace
+
 TEST(Passes, ARenderThatGoesOnFromACheckpointIsTheUnbrokenOne) {
   const api::Device device(2);
   const api::Scene s = scene(device);
   const api::Integrator i = integrator(device, 60);
   const Pictures unbroken = pictures(i, s, passes_of(5));
-  auto first = passes_of(2);
-  first.flags = LUMICUT_CHECKPOINTS;
-  std::vector<uint8_t> bytes;
-  {
-    const api::Render r(i, s, first);
-    r.wait();
-    bytes = checkpoint_of(r);
-  }
+  const std::vector<uint8_t> bytes = checkpoint_of_two(i, s);
   ASSERT_FALSE(bytes.empty());
   auto rest = passes_of(5);
   rest.checkpoint = bytes.data(), rest.checkpoint_size = bytes.size();
@@ -69,14 +72,7 @@ TEST(Passes, ACheckpointOfAnythingElseIsRefusedByName) {
   const api::Device device(1);
   const api::Scene s = scene(device);
   const api::Integrator i = integrator(device, 60);
-  auto f = passes_of(2);
-  f.flags = LUMICUT_CHECKPOINTS;
-  std::vector<uint8_t> bytes;
-  {
-    const api::Render r(i, s, f);
-    r.wait();
-    bytes = checkpoint_of(r);
-  }
+  const std::vector<uint8_t> bytes = checkpoint_of_two(i, s);
   const auto refusal = [&](const std::vector<uint8_t>& given, uint32_t width) -> std::string {
     auto rest = passes_of(3, width);
     rest.checkpoint = given.data(), rest.checkpoint_size = given.size();
