@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <tiny_gltf.h>
-#include <unistd.h>
 
 #include <array>
 #include <cmath>
@@ -13,9 +12,11 @@
 #include <functional>
 #include <numbers>
 
+#include "io/affine.h"
 #include "io/file_error.h"
-#include "io/sky.h"
+#include "io/scene_defaults.h"
 #include "io/texture_store.h"
+#include "io/unpack_folder.h"
 
 namespace lumicut::io {
 
@@ -29,42 +30,9 @@ constexpr double kLumensPerWatt = 683;  // as other exporters take it: candela, 
 constexpr size_t kMostNodes = 1 << 24;  // placed, each time a node is reached by one of its parents
 constexpr int kDeepest = 256;
 
-using Vec = std::array<double, 3>;
-
-Vec operator+(const Vec& a, const Vec& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-Vec operator*(const Vec& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
-double dot(const Vec& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec cross(const Vec& a, const Vec& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-Vec unit(const Vec& v) {
-  const double length = std::sqrt(dot(v, v));
-  return length > 0 ? v * (1 / length) : Vec{0, 0, 1};
-}
-
-// Three rows of four.
-struct Matrix {
-  std::array<double, 12> m{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-
-  Vec column(size_t c) const { return {m[c], m[4 + c], m[8 + c]}; }
-  Vec point(const Vec& p) const { return column(0) * p[0] + column(1) * p[1] + column(2) * p[2] + column(3); }
-  double determinant() const { return dot(column(0), cross(column(1), column(2))); }
-};
-
-Matrix operator*(const Matrix& a, const Matrix& b) {
-  Matrix out;
-  for (size_t r = 0; r < 3; ++r)
-    for (size_t c = 0; c < 4; ++c) {
-      double sum = c == 3 ? a.m[4 * r + 3] : 0;
-      for (size_t k = 0; k < 3; ++k) sum += a.m[4 * r + k] * b.m[4 * k + c];
-      out.m[4 * r + c] = sum;
-    }
-  return out;
-}
-
-Matrix placed(const Vec& move, const std::array<double, 4>& q, const Vec& scale) {
+Affine placed(const Vec& move, const std::array<double, 4>& q, const Vec& scale) {
   const auto [x, y, z, w] = q;
-  Matrix out;
+  Affine out;
   out.m = {1 - 2 * (y * y + z * z), 2 * (x * y - z * w),     2 * (x * z + y * w),     move[0],
            2 * (x * y + z * w),     1 - 2 * (x * x + z * z), 2 * (y * z - x * w),     move[1],
            2 * (x * z - y * w),     2 * (y * z + x * w),     1 - 2 * (x * x + y * y), move[2]};
@@ -72,27 +40,6 @@ Matrix placed(const Vec& move, const std::array<double, 4>& q, const Vec& scale)
     for (size_t c = 0; c < 3; ++c) out.m[4 * r + c] *= scale[c];
   return out;
 }
-
-// Images of the file, one file each, for the reader of pictures.
-class Folder {
- public:
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "lumicut-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr)
-      throw FileError(name, "cannot be made: images of glTF files are unpacked there");
-    path_ = name;
-  }
-  ~Folder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 class Reader {
  public:
@@ -122,8 +69,8 @@ class Reader {
     scene_.materials.push_back(plain);
     read_nodes();
     if (scene_.meshes.empty()) throw FileError(path_, "has no triangles: there is nothing to see");
-    if (!has_camera_) frame();
-    if (!lit()) add_sky();
+    if (!has_camera_) frame_scene(scene_);
+    if (!is_lit(scene_)) add_sky(scene_);
     scene_.file = path_;
     return std::move(scene_);
   }
@@ -434,11 +381,11 @@ class Reader {
     for (const int root : roots) read_node(root, {}, 0);
     std::erase_if(scene_.meshes, [](const Mesh& mesh) { return mesh.indices.empty() || mesh.transforms.empty(); });
   }
-  void read_node(int index, const Matrix& parent, int depth) {
+  void read_node(int index, const Affine& parent, int depth) {
     const std::string where = fmt::format("nodes[{}]", index);
     if (depth > kDeepest || ++placed_nodes_ > kMostNodes) fail(where, "nodes lie in each other without end");
     const gltf::Node& node = at(model_.nodes, index, where);
-    Matrix local;
+    Affine local;
     if (node.matrix.size() == 16) {
       for (size_t r = 0; r < 3; ++r)
         for (size_t c = 0; c < 4; ++c) local.m[4 * r + c] = node.matrix[4 * c + r];
@@ -450,7 +397,7 @@ class Reader {
                      q.size() == 4 ? std::array{q[0], q[1], q[2], q[3]} : std::array{0.0, 0.0, 0.0, 1.0},
                      s.size() == 3 ? Vec{s[0], s[1], s[2]} : Vec{1, 1, 1});
     }
-    const Matrix world = parent * local;
+    const Affine world = parent * local;
     for (const double v : world.m)
       if (!(std::abs(v) < kLargestCoordinate)) fail(where, fmt::format("its transform has the number {}", v));
     if (node.mesh >= 0) place(node, world, where);
@@ -459,9 +406,9 @@ class Reader {
       read_light(static_cast<int>(number_of(light, "light", -1)), world, where);
     for (const int child : node.children) read_node(child, world, depth + 1);
   }
-  void place(const gltf::Node& node, const Matrix& world, const std::string& where) {
+  void place(const gltf::Node& node, const Affine& world, const std::string& where) {
     at(model_.meshes, node.mesh, where);
-    std::vector<Matrix> places{world};
+    std::vector<Affine> places{world};
     if (const auto* instancing = extension(node.extensions, "EXT_mesh_gpu_instancing");
         instancing && instancing->Has("attributes")) {
       const auto& attributes = instancing->Get("attributes");
@@ -480,7 +427,7 @@ class Reader {
                                                   : std::array{q[4 * i], q[4 * i + 1], q[4 * i + 2], q[4 * i + 3]},
                                         s.empty() ? Vec{1, 1, 1} : Vec{s[3 * i], s[3 * i + 1], s[3 * i + 2]}));
     }
-    for (const Matrix& place : places) {
+    for (const Affine& place : places) {
       if (!(std::abs(place.determinant()) > 0)) {
         leave_out(where + ": what is scaled to nothing");
         continue;
@@ -492,19 +439,10 @@ class Reader {
 
   // ---- Camera and lights
 
-  void set_camera(const Vec& eye, const Vec& back, const Vec& up) {
-    lumicut_camera& camera = scene_.camera;
-    camera.struct_size = sizeof(camera);
-    const Vec z = unit(back), x = unit(cross(up, z)), y = cross(z, x);
-    for (size_t r = 0; r < 3; ++r) {
-      const double row[4] = {x[r], y[r], z[r], eye[r]};
-      for (size_t c = 0; c < 4; ++c) camera.to_world[4 * r + c] = static_cast<float>(row[c]);
-    }
-    has_camera_ = true;
-  }
-  void read_camera(int index, const Matrix& world, const std::string& where) {
+  void read_camera(int index, const Affine& world, const std::string& where) {
     const auto& from = at(model_.cameras, index, where);
-    set_camera(world.column(3), world.column(2), world.column(1));
+    set_camera(scene_, world.column(3), world.column(2), world.column(1));
+    has_camera_ = true;
     lumicut_camera& camera = scene_.camera;
     if (from.type == "orthographic") {
       camera.orthographic = 1;
@@ -518,25 +456,7 @@ class Reader {
       if (aspect > 0.05 && aspect < 20) scene_.width = static_cast<uint32_t>(std::lround(scene_.height * aspect));
     }
   }
-  // From the front and above, at a distance at which the ball around the scene fits.
-  void frame() {
-    Vec low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
-    for (const Mesh& mesh : scene_.meshes)
-      for (size_t t = 0; t < mesh.transforms.size(); t += 12) {
-        Matrix m;
-        for (size_t k = 0; k < 12; ++k) m.m[k] = mesh.transforms[t + k];
-        for (size_t p = 0; p < mesh.positions.size(); p += 3) {
-          const Vec q = m.point({mesh.positions[p], mesh.positions[p + 1], mesh.positions[p + 2]});
-          for (size_t k = 0; k < 3; ++k) low[k] = std::min(low[k], q[k]), high[k] = std::max(high[k], q[k]);
-        }
-      }
-    const Vec middle = (low + high) * 0.5, half = (high + low * -1.0) * 0.5;
-    const double radius = std::max(std::sqrt(dot(half, half)), 1e-6), fov = 0.7;
-    const Vec towards = unit({0.5, 0.4, 1});
-    set_camera(middle + towards * (1.05 * radius / std::sin(fov / 2)), towards, {0, 1, 0});
-    scene_.camera.fov_y = static_cast<float>(fov);
-  }
-  void read_light(int index, const Matrix& world, const std::string& where) {
+  void read_light(int index, const Affine& world, const std::string& where) {
     const gltf::Light& from = at(model_.lights, index, where);
     lumicut_light light{};
     light.struct_size = sizeof(light);
@@ -565,45 +485,11 @@ class Reader {
     scene_.lights.push_back(light);
     scene_.light_names.push_back(where);
   }
-  bool lit() const {
-    if (!scene_.lights.empty()) return true;
-    for (const Mesh& mesh : scene_.meshes)
-      for (const uint32_t material : mesh.materials) {
-        const auto& e = scene_.materials[material].values.emission;
-        if (e[0] + e[1] + e[2] > 0) return true;
-      }
-    return false;
-  }
-  void add_sky() {
-    Sky sky;
-    sky.sun_elevation = 50, sky.sun_azimuth = -60;
-    Texture map;
-    map.file = "sky";
-    map.width = 512, map.height = 256, map.channels = 3;
-    map.floats = sky.map(map.height, {0.2, 0.2, 0.2}, true);
-    scene_.textures.push_back(std::move(map));
-    lumicut_environment environment{};
-    environment.struct_size = sizeof(environment);
-    for (float& c : environment.color) c = 1;
-    environment.texture = static_cast<int32_t>(scene_.textures.size());
-    const float up[9] = {1, 0, 0, 0, 0, -1, 0, 1, 0};  // y is up in glTF, z in the map
-    std::copy(up, up + 9, environment.world_to_map);
-    scene_.environment = environment;
-    lumicut_light sun{};
-    sun.struct_size = sizeof(sun);
-    sun.type = LUMICUT_SUN, sun.value = 1, sun.radius = static_cast<float>(0.2666 * kPi / 180);
-    const auto irradiance = sky.sun_irradiance(), towards = sky.sun_direction();
-    for (size_t k = 0; k < 3; ++k) sun.color[k] = static_cast<float>(irradiance[k]);
-    const Vec down = Vec{towards[0], towards[2], -towards[1]} * -1.0;
-    for (size_t k = 0; k < 3; ++k) sun.direction[k] = static_cast<float>(down[k]);
-    scene_.lights.push_back(sun);
-    scene_.light_names.emplace_back("sky");
-  }
 
   std::string path_;
   SceneData scene_;
   gltf::Model model_;
-  Folder folder_;
+  UnpackFolder folder_;
   TextureStore textures_;
   std::map<std::pair<int, size_t>, int32_t> channels_;
   std::vector<size_t> first_;  // of a mesh's primitives in scene_.meshes; one more at the end

@@ -16,6 +16,7 @@
 #include <string_view>
 
 #include "io/file_error.h"
+#include "io/find_beside.h"
 #include "io/text_lines.h"
 
 namespace lumicut::io {
@@ -31,12 +32,6 @@ std::string trimmed(std::string_view text) {
   const size_t first = text.find_first_not_of(" \t\r\n\"");
   if (first == std::string_view::npos) return "";
   return std::string(text.substr(first, text.find_last_not_of(" \t\r\n\"") - first + 1));
-}
-
-std::string shown(std::string_view text) {
-  std::string out;
-  for (const char c : text.substr(0, 60)) out += static_cast<unsigned char>(c) >= ' ' && c != '\x7f' ? c : '?';
-  return out;
 }
 
 // First word of a line, and what follows it.
@@ -63,58 +58,6 @@ class LineBuffer : public std::streambuf {
  private:
   std::string& text_;
 };
-
-// ---- Names of files -------------------------------------------------------------------------------------------------
-
-bool is_file(const std::filesystem::path& path) {
-  std::error_code code;
-  return std::filesystem::exists(path, code) && !std::filesystem::is_directory(path, code);
-}
-
-// The same path in whatever case its folders and its name are written; "" when there is none.
-std::filesystem::path in_other_case(const std::filesystem::path& path) {
-  std::filesystem::path found;
-  for (const auto& part : path) {
-    std::error_code code;
-    std::filesystem::path next = found / part;
-    if (!std::filesystem::exists(next, code)) {
-      next.clear();
-      for (std::filesystem::directory_iterator i(found.empty() ? "." : found, code), end; !code && i != end;
-           i.increment(code))
-        if (lower(i->path().filename().string()) == lower(part.string()) && (next.empty() || i->path() < next))
-          next = found / i->path().filename();
-      if (next.empty()) return "";
-    }
-    found = next;
-  }
-  return found;
-}
-
-struct FoundFile {
-  std::string path;    // "": none
-  std::string remark;  // how it differs from what was asked for
-};
-
-// A file that `name` in `file` may mean: relative to the folder of `file`, with slashes either way, in other case, or,
-// where `name` is an absolute path of another machine, its last part beside `file`.
-FoundFile find_beside(const std::string& file, const std::string& name) {
-  const auto folder = std::filesystem::path(file).parent_path();
-  std::string slashes = name;
-  std::replace(slashes.begin(), slashes.end(), '\\', '/');
-  const bool drive = slashes.size() > 2 && std::isalpha(static_cast<unsigned char>(slashes[0])) && slashes[1] == ':';
-  const bool absolute = drive || slashes[0] == '/';
-  for (const std::string& spelling : {name, slashes})
-    if (is_file(folder / spelling)) return {(folder / spelling).string(), ""};
-  if (!drive)
-    if (const auto path = in_other_case(folder / slashes); is_file(path))
-      return {path.string(), fmt::format("{} is read in its place", shown(path.filename().string()))};
-  if (absolute) {
-    const auto last = folder / slashes.substr(slashes.rfind(drive && slashes[2] != '/' ? ':' : '/') + 1);
-    for (const auto& path : {last, in_other_case(last)})
-      if (is_file(path)) return {path.string(), fmt::format("{} is read in its place", shown(path.string()))};
-  }
-  return {};
-}
 
 // ---- MTL ------------------------------------------------------------------------------------------------------------
 

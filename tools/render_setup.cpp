@@ -8,8 +8,7 @@
 
 #include "io/atomic_file.h"
 #include "io/file_error.h"
-#include "io/scene_gltf.h"
-#include "io/scene_json.h"
+#include "io/scene_file.h"
 #include "tools/commands.h"
 #include "tools/interrupt_watcher.h"
 
@@ -34,7 +33,7 @@ void add_setup_options(CLI::App& command, RenderSetup& setup) {
 
 io::SceneData read_scene_file(const std::string& path) {
   const NothingToLose reading;
-  return io::is_gltf(path) ? io::read_gltf(path) : io::read_scene(path);
+  return io::read_scene_file(path);
 }
 
 void tell_warnings(const io::Warnings& warnings, const std::string& file, bool strict) {

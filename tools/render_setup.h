@@ -32,7 +32,7 @@ struct RenderSetup {
 // -i, -p, --vpls, --seed, --threads, --accel, --builder, --rays, --strict.
 void add_setup_options(CLI::App& command, RenderSetup& setup);
 
-// io::read_scene, which Ctrl-C ends at once.
+// io::read_scene_file, which Ctrl-C ends at once.
 io::SceneData read_scene_file(const std::string& path);
 
 // Prints on standard error what was noticed while the scene of that file was read; throws FileError when `strict` and

@@ -71,7 +71,7 @@ class Pictures(Cli):
             result = subprocess.run(words, env=env, capture_output=True, text=True)
             self.assertEqual(result.returncode, code, result.stderr)
             if code != OK:
-                self.assertIn("the module for pictures cannot be loaded", result.stderr)
+                self.assertIn("the module images.so cannot be loaded", result.stderr)
                 self.assertIn("lib/lumicut/images.so", result.stderr)
 
 

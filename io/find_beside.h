@@ -1,0 +1,21 @@
+// Files that other files name, on whatever machine they were written.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace lumicut::io {
+
+// At most 60 bytes of it, without control characters: for messages.
+std::string shown(std::string_view text);
+
+struct FoundFile {
+  std::string path;    // "": none
+  std::string remark;  // how it differs from what was asked for
+};
+
+// A file that `name` in `file` may mean: relative to the folder of `file`, with slashes either way, in other case, or,
+// where `name` is an absolute path of another machine, its last part beside `file`.
+FoundFile find_beside(const std::string& file, const std::string& name);
+
+}  // namespace lumicut::io

@@ -1,0 +1,111 @@
+#include "io/scene_model.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include "io/file_error.h"
+#include "io/find_beside.h"
+#include "io/isolated.h"
+#include "io/model.h"
+#include "io/module.h"
+#include "io/scene_defaults.h"
+#include "io/scene_obj.h"
+#include "io/text_lines.h"
+#include "io/texture_store.h"
+#include "io/unpack_folder.h"
+
+namespace lumicut::io {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr double kSeconds = 600;  // of the processor, for one file
+
+std::string ending_of(const std::string& path) { return lower(fs::path(path).extension().string()); }
+
+// Numbers of the scene's textures by those of the model's.
+std::vector<int32_t> read_textures(const Model& model, const std::string& path, SceneData& scene) {
+  TextureStore store(scene.textures);
+  const UnpackFolder folder;
+  std::vector<int32_t> numbers;
+  for (const ModelTexture& texture : model.textures) {
+    const std::string user = fmt::format("the model {}", path);
+    if (!texture.bytes.empty()) {
+      const std::string file = (folder.path() / fmt::format("image{}", numbers.size())).string();
+      std::ofstream out(file, std::ios::binary);
+      out.write(texture.bytes.data(), static_cast<std::streamsize>(texture.bytes.size()));
+      if (!out.flush()) throw FileError(file, "cannot be written");
+      numbers.push_back(store.get(file, texture.use, texture.flags, user));
+      continue;
+    }
+    const FoundFile file = find_beside(path, texture.name);
+    if (file.path.empty())
+      scene.warnings.add("missing textures", path,
+                         fmt::format("the texture {} does not exist; {}", texture.name,
+                                     texture.use == TextureUse::colour ? "grey stands in" : "left out"));
+    else if (!file.remark.empty())
+      scene.warnings.add("names of textures that differ from their files'", path,
+                         fmt::format("the texture {} does not exist; {}", texture.name, file.remark));
+    if (!file.path.empty())
+      numbers.push_back(store.get(file.path, texture.use, texture.flags, user));
+    else
+      numbers.push_back(texture.use == TextureUse::colour ? store.grey() : 0);
+  }
+  return numbers;
+}
+
+SceneData read_by_assimp(const std::string& path) {
+  check_regular_file(path);
+  const std::string reader = fmt::format("the reader of {} files", ending_of(path).substr(1));
+  const std::string bytes = isolated(path, reader, kSeconds, [&] {
+    Packer packer;
+    const Model model = load_module<ModelModule>(path, "models", "lumicut_model_module")->read(path);
+    pack(packer, model);
+    return packer.take();
+  });
+  Model model;
+  Unpacker unpacker(bytes, path);
+  pack(unpacker, model);
+  SceneData scene = std::move(model.scene);
+  for (const auto& [kind, text] : model.warnings) scene.warnings.add(kind, path, text);
+  const auto numbers = read_textures(model, path, scene);
+  for (Material& material : scene.materials) {
+    lumicut_material& m = material.values;
+    for (int32_t* t :
+         {&m.diffuse_texture, &m.specular_texture, &m.opacity_texture, &m.emission_texture, &m.normal_texture})
+      if (*t > 0) *t = numbers.at(static_cast<size_t>(*t) - 1);
+  }
+  if (!model.has_camera) frame_scene(scene);
+  return scene;
+}
+
+SceneData read_obj_scene(const std::string& path) {
+  SceneData scene;
+  TextureStore textures(scene.textures);
+  ObjModel model = read_obj(path, {}, textures, scene.warnings);
+  for (const auto& [name, values] : model.materials) scene.materials.push_back({name, values});
+  scene.meshes = std::move(model.meshes);
+  for (Mesh& mesh : scene.meshes) mesh.name = path;
+  frame_scene(scene);
+  return scene;
+}
+
+}  // namespace
+
+bool is_model(const std::string& path) {
+  static const std::set<std::string> kEndings = {".obj", ".ply", ".fbx", ".dae"};
+  return kEndings.count(ending_of(path)) != 0;
+}
+
+SceneData read_model(const std::string& path) {
+  SceneData scene = ending_of(path) == ".obj" ? read_obj_scene(path) : read_by_assimp(path);
+  if (!is_lit(scene)) add_sky(scene);
+  scene.file = path;
+  return scene;
+}
+
+}  // namespace lumicut::io
