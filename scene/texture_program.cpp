@@ -57,152 +57,232 @@ float smooth_least(float a, float b, float reach) {
   return std::min(a, b) - h * h * h * reach * (1.0f / 6.0f);
 }
 
-float math(uint32_t mode, float a, float b, float c) {
+// Modes of LUMICUT_OP_MATH, in their order.
+enum class MathMode : uint32_t {
+  add,
+  subtract,
+  multiply,
+  divide,
+  multiply_add,
+  power,
+  logarithm,
+  sqrt,
+  inverse_sqrt,
+  absolute,
+  exponent,
+  minimum,
+  maximum,
+  less_than,
+  greater_than,
+  sign,
+  compare,
+  smooth_min,
+  smooth_max,
+  round,
+  floor,
+  ceil,
+  trunc,
+  fract,
+  modulo,
+  floored_modulo,
+  wrap,
+  snap,
+  pingpong,
+  sine,
+  cosine,
+  tangent,
+  arcsine,
+  arccosine,
+  arctangent,
+  arctan2,
+  sinh,
+  cosh,
+  tanh,
+  radians,
+  degrees,
+};
+
+float math(MathMode mode, float a, float b, float c) {
+  using M = MathMode;
   switch (mode) {
-    case 0:
+    case M::add:
       return a + b;
-    case 1:
+    case M::subtract:
       return a - b;
-    case 2:
+    case M::multiply:
       return a * b;
-    case 3:
+    case M::divide:
       return divided(a, b);
-    case 4:
+    case M::multiply_add:
       return a * b + c;
-    case 5:
+    case M::power:
       return power(a, b);
-    case 6:
+    case M::logarithm:
       return a > 0.0f && b > 0.0f ? divided(std::log(a), std::log(b)) : 0.0f;
-    case 7:
+    case M::sqrt:
       return std::sqrt(std::max(a, 0.0f));
-    case 8:
+    case M::inverse_sqrt:
       return a > 0.0f ? 1.0f / std::sqrt(a) : 0.0f;
-    case 9:
+    case M::absolute:
       return std::abs(a);
-    case 10:
+    case M::exponent:
       return std::exp(a);
-    case 11:
+    case M::minimum:
       return std::min(a, b);
-    case 12:
+    case M::maximum:
       return std::max(a, b);
-    case 13:
+    case M::less_than:
       return a < b ? 1.0f : 0.0f;
-    case 14:
+    case M::greater_than:
       return a > b ? 1.0f : 0.0f;
-    case 15:
+    case M::sign:
       return a > 0.0f ? 1.0f : (a < 0.0f ? -1.0f : 0.0f);
-    case 16:
+    case M::compare:
       return std::abs(a - b) <= std::max(c, 1e-5f) ? 1.0f : 0.0f;
-    case 17:
+    case M::smooth_min:
       return smooth_least(a, b, c);
-    case 18:
+    case M::smooth_max:
       return -smooth_least(-a, -b, c);
-    case 19:
+    case M::round:
       return std::floor(a + 0.5f);
-    case 20:
+    case M::floor:
       return std::floor(a);
-    case 21:
+    case M::ceil:
       return std::ceil(a);
-    case 22:
+    case M::trunc:
       return std::trunc(a);
-    case 23:
+    case M::fract:
       return fraction(a);
-    case 24:
+    case M::modulo:
       return modulo(a, b);
-    case 25:
+    case M::floored_modulo:
       return b != 0.0f ? a - std::floor(a / b) * b : 0.0f;
-    case 26:
+    case M::wrap:
       return wrapped(a, b, c);
-    case 27:
+    case M::snap:
       return snapped(a, b);
-    case 28:
+    case M::pingpong:
       return b != 0.0f ? std::abs(fraction((a - b) / (b * 2.0f)) * b * 2.0f - b) : 0.0f;
-    case 29:
+    case M::sine:
       return std::sin(a);
-    case 30:
+    case M::cosine:
       return std::cos(a);
-    case 31:
+    case M::tangent:
       return std::tan(a);
-    case 32:
+    case M::arcsine:
       return std::asin(std::clamp(a, -1.0f, 1.0f));
-    case 33:
+    case M::arccosine:
       return std::acos(std::clamp(a, -1.0f, 1.0f));
-    case 34:
+    case M::arctangent:
       return std::atan(a);
-    case 35:
+    case M::arctan2:
       return std::atan2(a, b);
-    case 36:
+    case M::sinh:
       return std::sinh(a);
-    case 37:
+    case M::cosh:
       return std::cosh(a);
-    case 38:
+    case M::tanh:
       return std::tanh(a);
-    case 39:
+    case M::radians:
       return a * (kPi / 180.0f);
+    case M::degrees:
     default:
       return a * (180.0f / kPi);
   }
 }
 
-Vec3f vector_math(uint32_t mode, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+// Modes of LUMICUT_OP_VECTOR, in their order.
+enum class VectorMode : uint32_t {
+  add,
+  subtract,
+  multiply,
+  divide,
+  multiply_add,
+  cross_product,
+  project,
+  reflect,
+  refract,
+  faceforward,
+  dot_product,
+  distance,
+  length,
+  scale,
+  normalize,
+  absolute,
+  minimum,
+  maximum,
+  floor,
+  ceil,
+  fraction,
+  modulo,
+  wrap,
+  snap,
+  sine,
+  cosine,
+  tangent,
+};
+
+Vec3f vector_math(VectorMode mode, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+  using M = VectorMode;
   switch (mode) {
-    case 0:
+    case M::add:
       return a + b;
-    case 1:
+    case M::subtract:
       return a - b;
-    case 2:
+    case M::multiply:
       return a * b;
-    case 3:
+    case M::divide:
       return each(a, b, divided);
-    case 4:
+    case M::multiply_add:
       return a * b + c;
-    case 5:
+    case M::cross_product:
       return cross(a, b);
-    case 6:
+    case M::project:
       return b * divided(dot(a, b), length2(b));
-    case 7: {
+    case M::reflect: {
       const Vec3f n = normalize(b);
       return a - n * (2.0f * dot(a, n));
     }
-    case 8: {
+    case M::refract: {
       const Vec3f n = normalize(b);
       const float cosine = dot(n, a), k = 1.0f - c.x * c.x * (1.0f - cosine * cosine);
       return k < 0.0f ? Vec3f{} : a * c.x - n * (c.x * cosine + std::sqrt(k));
     }
-    case 9:
+    case M::faceforward:
       return dot(c, b) < 0.0f ? a : -a;
-    case 10:
+    case M::dot_product:
       return all(dot(a, b));
-    case 11:
+    case M::distance:
       return all(length(a - b));
-    case 12:
+    case M::length:
       return all(length(a));
-    case 13:
+    case M::scale:
       return a * b.x;
-    case 14:
+    case M::normalize:
       return normalize(a);
-    case 15:
+    case M::absolute:
       return max(a, -a);
-    case 16:
+    case M::minimum:
       return min(a, b);
-    case 17:
+    case M::maximum:
       return max(a, b);
-    case 18:
+    case M::floor:
       return each(a, [](float x) { return std::floor(x); });
-    case 19:
+    case M::ceil:
       return each(a, [](float x) { return std::ceil(x); });
-    case 20:
+    case M::fraction:
       return each(a, fraction);
-    case 21:
+    case M::modulo:
       return each(a, b, modulo);
-    case 22:
+    case M::wrap:
       return each(a, b, c, wrapped);
-    case 23:
+    case M::snap:
       return each(a, b, snapped);
-    case 24:
+    case M::sine:
       return each(a, [](float x) { return std::sin(x); });
-    case 25:
+    case M::cosine:
       return each(a, [](float x) { return std::cos(x); });
+    case M::tangent:
     default:
       return each(a, [](float x) { return std::tan(x); });
   }
@@ -685,9 +765,9 @@ Vec3f TextureProgram::value(const ProgramInstruction& in, const ProgramPoint& p,
       return in.mode == 0 ? t.point(input(0)) : (in.mode == 1 ? t.vector(input(0)) : t.normal(input(0)));
     }
     case ProgramOp::math:
-      return all(math(in.mode, number(0), number(1), number(2)));
+      return all(math(static_cast<MathMode>(in.mode), number(0), number(1), number(2)));
     case ProgramOp::vector:
-      return vector_math(in.mode, input(0), input(1), input(2));
+      return vector_math(static_cast<VectorMode>(in.mode), input(0), input(1), input(2));
     case ProgramOp::grey: {
       const Vec3f& v = input(0);
       return all(in.mode == 0 ? luminance(v) : (v.x + v.y + v.z) * (1.0f / 3.0f));
