@@ -13,12 +13,14 @@ bl_info = {
 if "bpy" in locals():  # reloaded by the host: its parts, too, from the bottom up
     import importlib
     for _part in (library, report, scene_data, images, mappings, programs, nodes, mesh_attributes, materials, ies, sky, directions,  # noqa: F821
-                  lights, worlds, cameras, soft_spots, collect, runtime, properties, shadow_catcher, passes, export, viewport, engine, preferences, panels):  # noqa: F821
+                  lights, worlds, cameras, soft_spots, collect, runtime, properties, migration, shadow_catcher, passes, export, viewport,  # noqa: F821
+                  engine, preferences, operators, panels, data_panels):  # noqa: F821
         importlib.reload(_part)
 else:
     from .lumicut import library  # noqa: F401
-    from . import (cameras, collect, directions, engine, export, ies, images, lights, mappings, materials, mesh_attributes, nodes, panels,  # noqa: F401
-                   passes, preferences, programs, properties, report, runtime, scene_data, shadow_catcher, sky, soft_spots, viewport, worlds)
+    from . import (cameras, collect, data_panels, directions, engine, export, ies, images, lights, mappings, materials,  # noqa: F401
+                   mesh_attributes, migration, nodes, operators, panels, passes, preferences, programs, properties, report,
+                   runtime, scene_data, shadow_catcher, sky, soft_spots, viewport, worlds)
 
 import bpy  # noqa: E402, F401
 
@@ -28,13 +30,19 @@ def register():
     if runtime.load() is None:
         print(f"lumicut: {runtime.failure()}", flush=True)
     properties.register()
+    migration.register()
     engine.register()
+    operators.register()
     panels.register()
+    data_panels.register()
 
 
 def unregister():
+    data_panels.unregister()
     panels.unregister()
+    operators.unregister()
     engine.unregister()
+    migration.unregister()
     properties.unregister()
     runtime.release()
     bpy.utils.unregister_class(preferences.LumicutPreferences)

@@ -173,8 +173,9 @@ class LumicutEngine(bpy.types.RenderEngine):
                     self.update_progress(1.0)
                     stats = render.stats()
         if not self.is_preview:
+            runtime.remember(report)
             runtime.last.update(stats=stats, collect_seconds=collected, seconds=time.perf_counter() - started,
-                                integrator=integrator_name, notes=report.lines(),
+                                integrator=integrator_name,
                                 scene={"triangles": triangles, "instances": instances, "meshes": meshes, "lamps": lamps})
 
     @staticmethod
@@ -210,7 +211,7 @@ class LumicutEngine(bpy.types.RenderEngine):
     def _tell(self, report):
         if self.is_preview:
             return
-        runtime.last["notes"] = report.lines()
+        runtime.remember(report)
         for line in report.lines(most_names=12):
             if line not in self._told:
                 self._told.add(line)

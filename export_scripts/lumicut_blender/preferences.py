@@ -21,5 +21,5 @@ class LumicutPreferences(bpy.types.AddonPreferences):
             layout.label(text=f"Lumicut {lib.version}, {lib.origin}: {lib.path}", icon="CHECKMARK")
         else:
             from .panels import wrapped
-            wrapped(layout, runtime.failure(), 90, "ERROR")
+            wrapped(layout, runtime.failure(), context, "ERROR")
         layout.operator("lumicut.reload_library", icon="FILE_REFRESH")

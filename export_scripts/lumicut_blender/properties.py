@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of a scene. Those of the integrators are drawn from the library's own parameter tables, none is named here."""
+"""Settings of a scene. Those of the integrators are drawn from the library's own parameter tables, none is named here.
+What nobody set is as the preset Good has it."""
+import math
+import re
+
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
 
@@ -28,30 +32,38 @@ GROUP_PASS = "Combined_"  # of a light group, as Cycles names it
 
 STOPS = ("passes", "max_seconds", "target_error", "confidence")  # of lumicut_render_desc, under the same names
 
-DEFAULT_INTEGRATOR = "illumination_cut"
 PRESETS = {
     # name, a quality of the library's: (label, tooltip, own settings, integrator, which the library suggests parameters for)
-    "draft": ("Draft", "A first look: one sample, few lights, wide bounds",
-              {"samples": 1}, DEFAULT_INTEGRATOR),
-    "good": ("Good", "For most images: the mean of 16 passes of 3,000 lights each, with what the clamp takes brought back, denoised",
+    "draft": ("Draft", "For a first look: one image of few lights with wide bounds, not denoised. Corners and gloss are too dark",
+              {"samples": 1, "passes": 1}, "illumination_cut"),
+    "good": ("Good", "For most images, and what a new scene has: the mean of 16 iterations of 3,000 lights each, with what the clamp takes brought back, denoised",
              {"samples": 1, "passes": 16}, "lightcuts"),
-    "reference": ("Reference", "256 passes that each sum all of 4,000 lights anew, with what the clamp takes brought back: slow, and as path traced: corners, gloss and glass too",
+    "reference": ("Reference", "To compare with path tracers: 256 iterations that each sum all of 4,000 lights anew, with what the clamp takes brought back. Slow",
                   {"samples": 1, "passes": 256}, "exhaustive"),
 }
+DEFAULT_PRESET = "good"
+RENDER_SETTINGS = ("samples", *STOPS, "denoise", "firefly_filter")  # what presets set beside the integrator and its parameters
+SMALL_WORDS = {"a", "an", "and", "are", "as", "at", "by", "for", "in", "of", "or", "the", "to", "with"}
 
 
-def property_of(parameter):
-    """The Blender property that a row of the library's table asks for."""
+def title_case(text):
+    """A label as Blender writes them: "Clamp (relative)" becomes "Clamp (Relative)"."""
+    words = re.split(r"([\s(]+)", text)
+    return "".join(word if i > 0 and word in SMALL_WORDS else word[:1].upper() + word[1:] for i, word in enumerate(words))
+
+
+def property_of(parameter, default=None):
+    """The Blender property that a row of the library's table asks for. `default`: another one, as text."""
     unit = parameter["unit"]
     text = parameter["description"] + (f" [{unit}]" if unit else "")
-    common = {"name": parameter["label"], "description": text}
-    default = parameter["default_text"]
+    common = {"name": title_case(parameter["label"]), "description": text}
+    default = parameter["default_text"] if default is None else default
     low, high = parameter["minimum"], parameter["maximum"]
     if parameter["type"] == library.BOOL:
         return BoolProperty(default=default in {"1", "true"}, **common)
     if parameter["type"] == library.CHOICE:
         names = parameter["choices"].split("|")
-        items = [(name, name.replace("_", " ").capitalize(), text) for name in names]
+        items = [(name, title_case(name.replace("_", " ")), text) for name in names]
         return EnumProperty(items=items, default=default, **common)
     if parameter["type"] == library.INT:
         limit = 2**31 - 1
@@ -105,8 +117,8 @@ class Tables:
         """(integrator, its parameters) for a quality: the wanted one, or the first that the library suggests something for,
         or the first."""
         rows = [row for row in self.integrators if row.presets[quality]] or self.integrators
-        row = next((row for row in rows if row.id == wanted), rows[0])
-        return row.id, row.presets[quality]
+        row = next((row for row in rows if row.id == wanted), rows[0] if rows else None)
+        return (row.id, row.presets[quality]) if row is not None else ("", {})
 
     def groups(self):
         """[(group, [parameters])]; the common ones first."""
@@ -140,64 +152,112 @@ def common_parameters_of(settings, integrator):
     return {p["id"]: text_of(getattr(getattr(settings, COMMON), p["id"])) for p in tables.common_of(integrator)}
 
 
-def apply_preset(settings, name):
+def preset_values(name):
+    """{(group or None for the scene's own, property): value} of all that a preset sets: but for the seed, what an image
+    depends on."""
     _, _, own, wanted = PRESETS[name]
-    for key in (*STOPS, "denoise", "firefly_filter"):
-        settings.property_unset(key)
-    for key, value in own.items():
-        setattr(settings, key, value)
-    settings.integrator, values = tables.suggested(name, wanted)
+    values = {(None, key): own.get(key, DEFAULTS[key]) for key in RENDER_SETTINGS}
+    integrator, suggested = tables.suggested(name, wanted)
+    values[None, "integrator"] = integrator
+    for group, parameters in ((COMMON, tables.common_of(integrator)), (integrator, tables.own_of(integrator))):
+        values |= {(group, p["id"]): value_of(p, suggested.get(p["id"], p["default_text"])) for p in parameters if p["id"] != "seed"}
+    return values
+
+
+def _owner(settings, group):
+    return settings if group is None else getattr(settings, group)
+
+
+def apply_preset(settings, name):
+    for (group, key), value in preset_values(name).items():
+        setattr(_owner(settings, group), key, value)
+
+
+def active_preset(settings):
+    """The preset that the settings are those of, or None."""
+    def same(a, b):
+        return math.isclose(a, b, rel_tol=1e-5) if isinstance(b, float) else a == b
+
+    for name in PRESETS:
+        if all(same(getattr(_owner(settings, group), key), value) for (group, key), value in preset_values(name).items()):
+            return name
+    return None
+
+
+def saved_values(settings):
+    """As preset_values, of the scene: with all that a file or a preset of the user's keeps."""
+    values = {(None, key): getattr(settings, key) for key in (*RENDER_SETTINGS, "integrator")}
     for group, parameters in tables.groups():
-        if group not in {COMMON, settings.integrator}:
-            continue
-        for p in parameters:
-            target = getattr(settings, group)
-            if p["id"] in values:
-                setattr(target, p["id"], value_of(p, values[p["id"]]))
-            elif p["id"] != "seed":
-                target.property_unset(p["id"])
+        values |= {(group, p["id"]): getattr(getattr(settings, group), p["id"]) for p in parameters}
+    return values
+
+
+def _set_threshold(settings, on):
+    settings.target_error = USUAL_ERROR if on else 0.0
+
+
+def _set_viewport_threshold(settings, on):
+    settings.viewport_target_error = USUAL_ERROR if on else 0.0
+
+
+USUAL_ERROR = 0.02  # when the threshold is switched on
+DEFAULTS = {"samples": 1, "passes": 1, "max_seconds": 0.0, "target_error": 0.0, "confidence": 0.95, "denoise": True, "firefly_filter": True}
 
 
 def register():
     global tables
     lib = runtime.loaded()
     tables = Tables(lib.integrators() if lib is not None else [])
+    untouched = DEFAULTS | PRESETS[DEFAULT_PRESET][2]
     annotations = {
-        "samples": IntProperty(name="Samples", description="Samples a pixel, for edges, texture and depth of field. One lies at the pixel's centre",
-                               default=4, min=1, max=65536, soft_max=64),
-        "passes": IntProperty(name="Passes", description="Whole images with virtual lights of their own, averaged: with Compensate they converge to the path traced image. 0: until stopped by what follows",
-                              default=1, min=0, max=1 << 20, soft_max=64),
-        "max_seconds": FloatProperty(name="Time Limit", description="Stop after the pass that ends nearest to this; 0: never",
-                                     default=0.0, min=0.0, max=1e9, unit="TIME_ABSOLUTE"),
-        "target_error": FloatProperty(name="Target Error", description="Stop after at least 8 passes, when the error is at most this share of a pixel's luminance, in as large a part of the pixels as Confidence says; 0: never",
-                                      default=0.0, min=0.0, max=1.0, precision=3, step=1),
-        "confidence": FloatProperty(name="Confidence", description="Of the interval of the pass Error and of Target Error",
-                                    default=0.95, min=0.5, max=0.999, precision=3, step=1),
-        "denoise": BoolProperty(name="Denoise", description="From two passes on: take away the noise of compensation, gloss and glass, by what the passes tell of it. The light of virtual lights stays as it is",
-                                default=True),
-        "firefly_filter": BoolProperty(name="Spread Fireflies", description="What is bright in a single pass is spread over its surroundings, so that it is no dot. No light is lost",
-                                       default=True),
-        "denoise_viewport": BoolProperty(name="Viewport", description="The viewport's last picture is the mean of four passes, denoised: for scenes that compensate, and for the path tracer",
-                                         default=False),
-        "accel": EnumProperty(name="Tree for Rays", description="What finds the triangles that rays hit", items=ACCELS, default="bvh"),
-        "builder": EnumProperty(name="Tree Builder", description="How the library's own tree is made", items=BUILDERS, default="DEFAULT"),
-        "robust": BoolProperty(name="Watertight Rays", description="No ray slips between two triangles that share an edge; without it, tracing is a little faster",
+        "version": IntProperty(description="Of what the file's settings mean, see migration.py", default=0, options={"HIDDEN"}),
+        "samples": IntProperty(name="Samples", description="Samples a pixel in each iteration, for edges, texture and depth of field. Leave it at 1 where there are many iterations",
+                               default=untouched["samples"], min=1, max=65536, soft_max=64),
+        "passes": IntProperty(name="Iterations", description="Images with virtual lights of their own that are averaged: twice as many halve the noise's square. 0: until the noise threshold or the time limit ends the render",
+                              default=untouched["passes"], min=0, max=1 << 20, soft_max=256),
+        "max_seconds": FloatProperty(name="Time Limit", description="Stop after the iteration that ends nearest to this, in seconds. 0: no limit",
+                                     default=untouched["max_seconds"], min=0.0, max=1e9, unit="TIME_ABSOLUTE"),
+        "use_threshold": BoolProperty(name="Noise Threshold", description="Stop before the last iteration where the image is clean enough",
+                                      get=lambda settings: settings.target_error > 0, set=_set_threshold),
+        "target_error": FloatProperty(name="Noise Threshold", description="Stop after 8 iterations or more, when the error is at most this share of a pixel's luminance, in as large a part of the pixels as Confidence says. Smaller is cleaner and slower. 0: never",
+                                      default=untouched["target_error"], min=0.0, max=1.0, precision=3, step=1),
+        "confidence": FloatProperty(name="Confidence", description="How sure the noise threshold and the pass Error are: the part of the pixels whose error is within what they say",
+                                    default=untouched["confidence"], min=0.5, max=0.999, precision=3, step=1),
+        "denoise": BoolProperty(name="Denoise", description="Take away the noise of compensation, gloss and glass at the end of a frame of two or more iterations, by what these tell of it. The light of virtual lights stays as it is",
+                                default=untouched["denoise"]),
+        "firefly_filter": BoolProperty(name="Spread Fireflies", description="Spread what is bright in a single iteration over its surroundings, so that it is no dot. No light is lost",
+                                       default=untouched["firefly_filter"]),
+        "viewport_passes": IntProperty(name="Iterations", description="How many images the viewport averages after the first coarse ones, each with virtual lights of its own",
+                                       default=16, min=1, max=1 << 20, soft_max=256),
+        "viewport_seconds": FloatProperty(name="Time Limit", description="Stop refining the viewport after so many seconds. 0: no limit",
+                                          default=0.0, min=0.0, max=1e9, unit="TIME_ABSOLUTE"),
+        "use_viewport_threshold": BoolProperty(name="Noise Threshold", description="Stop refining the viewport where its picture is clean enough",
+                                               get=lambda settings: settings.viewport_target_error > 0, set=_set_viewport_threshold),
+        "viewport_target_error": FloatProperty(name="Noise Threshold", description="Stop refining the viewport when the error is at most this share of a pixel's luminance. 0: never",
+                                               default=0.0, min=0.0, max=1.0, precision=3, step=1),
+        "denoise_viewport": BoolProperty(name="Denoise", description="Denoise the viewport's picture after its last iteration, where there are two or more",
+                                         default=True),
+        "accel": EnumProperty(name="Rays By", description="What finds the triangles that rays hit", items=ACCELS, default="bvh"),
+        "builder": EnumProperty(name="Builder", description="How the library's own tree is made: takes time once a frame, and saves some on each ray", items=BUILDERS, default="DEFAULT"),
+        "robust": BoolProperty(name="Watertight Rays", description="No ray slips between two triangles that share an edge. Switch it off to trace a little faster",
                                default=True),
-        "max_shininess": FloatProperty(name="Gloss Limit", description="Sharpest glossy lobe that lights shade, as Blinn's exponent: sharper ones, up to mirrors, show the virtual lights as blots",
+        "max_shininess": FloatProperty(name="Gloss Limit", description="Sharpest glossy lobe that lights shade, as Blinn's exponent: sharper ones, up to mirrors, show the virtual lights as blots. Lower it where gloss is blotchy",
                                        default=300.0, min=1.0, max=100000.0),
-        "viewport_lights": IntProperty(name="Viewport Lights", description="Virtual lights while the viewport renders",
+        "viewport_lights": IntProperty(name="Lights", description="Virtual lights in each iteration of the viewport. Fewer answer faster, more are smoother",
                                        default=5000, min=100, max=1000000),
-        "threads": IntProperty(name="Threads", description="0: all", default=0, min=0, max=1024),
+        "threads": IntProperty(name="Threads", description="Threads that render. 0: as many as the machine has. Leave one to the interface where there are few",
+                               default=0, min=0, max=1024),
     }
+    preset, suggested = tables.suggested(DEFAULT_PRESET, PRESETS[DEFAULT_PRESET][3])
     if tables.integrators:
-        identifiers = [row.id for row in tables.integrators]
         annotations["integrator"] = EnumProperty(
             name="Integrator", description="How the virtual lights are summed",
             items=[(row.id, row.label, f"{row.description}. {row.source}") for row in tables.integrators],
-            default=DEFAULT_INTEGRATOR if DEFAULT_INTEGRATOR in identifiers else identifiers[0])
+            default=preset)
     for group, parameters in tables.groups():
+        defaults = suggested if group in {COMMON, preset} else {}
         cls = type(f"LumicutParameters_{group}", (bpy.types.PropertyGroup,),
-                   {"__annotations__": {p["id"]: property_of(p) for p in parameters}})
+                   {"__annotations__": {p["id"]: property_of(p, defaults.get(p["id"])) for p in parameters}})
         bpy.utils.register_class(cls)
         _classes.append(cls)
         annotations[group] = PointerProperty(type=cls)

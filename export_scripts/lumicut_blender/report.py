@@ -1,5 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a scene holds that the renderer approximates or leaves out, by name: once per render, in the log and a panel."""
+import re
+
+WRONG, APPROXIMATED, NUANCE = range(3)  # severities, worst first
+
+# What a viewer of the picture misses or finds in it; all else is near what was asked for.
+_WRONG = re.compile(r"left out|not there|without data|without an image|without the|constant|taken as black|cannot|"
+                    r"in place of|nothing within|should see|cast them here|light all here|all see here|ordinary objects")
+# What only a measurement tells.
+_NUANCES = re.compile(r"of the same median width|of single scattering darkened|coats?, taken as|cut to that|rendered by Cycles into an image|"
+                      r"read with a remark|moved to the origin|Diffuse parts of two models|Colours above 1|shapes? of the aperture", re.I)
+
+
+def severity_of(text):
+    return NUANCE if _NUANCES.search(text) else WRONG if _WRONG.search(text) else APPROXIMATED
 
 
 class Report:
@@ -24,10 +38,14 @@ class Report:
     def __bool__(self):
         return bool(self._notes)
 
+    def entries(self):
+        """[(severity, text, names)], worst first."""
+        return sorted(((severity_of(text), text, list(names)) for text, names in self._notes.items()), key=lambda entry: entry[0])
+
     def lines(self, most_names=None):
-        """One line per approximation, with the names it applies to; `most_names`: others are counted."""
+        """One line per approximation, worst first, with the names it applies to; `most_names`: others are counted."""
         result = []
-        for text, names in self._notes.items():
+        for _, text, names in self.entries():
             shown = names if most_names is None or len(names) <= most_names else names[:most_names]
             more = f" and {len(names) - len(shown)} more" if len(names) > len(shown) else ""
             result.append(f"{text}: {', '.join(shown)}{more}")

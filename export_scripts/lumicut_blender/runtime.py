@@ -8,7 +8,7 @@ from .lumicut import library
 
 FOLDER = pathlib.Path(__file__).parent / "lib"  # of the zip
 _state = {"library": None, "failure": "", "device": None, "threads": None, "accels": {}}
-last = {"stats": {}, "notes": [], "collect_seconds": 0.0, "seconds": 0.0, "integrator": "", "scene": {}}
+last = {"stats": {}, "notes": [], "entries": [], "collect_seconds": 0.0, "seconds": 0.0, "integrator": "", "scene": {}}
 
 
 def preferences():
@@ -69,6 +69,11 @@ def has_accel(name):
         except library.Error:
             _state["accels"][name] = False
     return _state["accels"][name]
+
+
+def remember(report):
+    """What the panel Approximated shows."""
+    last.update(notes=report.lines(), entries=report.entries())
 
 
 def release():

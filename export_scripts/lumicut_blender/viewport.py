@@ -5,6 +5,7 @@ The interface's thread collects what changed and draws the last picture; uploadi
 worker's. A new view or scene cancels what runs; nothing waits for it.
 """
 import threading
+import time
 import traceback
 import weakref
 
@@ -20,7 +21,8 @@ from .report import Report
 
 # (pixels of the view a pixel of the picture, quality that the library suggests an integrator for or None for the scene's own)
 LEVELS = ((8, "interactive"), (3, "preview"), (1, None))
-DENOISED_PASSES = 4
+POLL_MS = 40
+SHOW_SECONDS = 0.5  # between two pictures of the finest level's passes
 _sessions = weakref.WeakSet()
 TICK = 0.05
 
@@ -65,7 +67,7 @@ class Session:
         self.data = data
         self.settings = self._settings(settings)
         self.view = None  # the next draw asks for it
-        runtime.last["notes"] = report.lines()
+        runtime.remember(report)
         engine.tag_redraw()
 
     @staticmethod
@@ -79,8 +81,12 @@ class Session:
             values = (properties.parameters_of if name == chosen else properties.common_parameters_of)(settings, name) | suggested
             if "vpls" in values:
                 values["vpls"] = str(settings.viewport_lights)
+            if quality and "compensate" in values:
+                values["compensate"] = "false"  # noise, until passes average it
             levels.append((divisor, name, values))
-        return {"levels": levels, "denoise": settings.denoise_viewport, "exposure": passes.exposure(settings.id_data), "tracing": properties.tracing_of(settings), "threads": settings.threads}
+        final = {"passes": settings.viewport_passes, "max_seconds": settings.viewport_seconds, "target_error": settings.viewport_target_error,
+                 "confidence": settings.confidence}
+        return {"levels": levels, "final": final, "denoise": settings.denoise_viewport and settings.viewport_passes > 1, "exposure": passes.exposure(settings.id_data), "tracing": properties.tracing_of(settings), "threads": settings.threads}
 
     def draw(self, engine, context, depsgraph):
         region = context.region
@@ -195,7 +201,6 @@ class Session:
             raise library.Cancelled(library.CANCELLED, "a newer view waits")
 
     def _render_levels(self, device, scene, integrators, size, settings, camera):
-        data = self.data
         for number, (divisor, name, values) in enumerate(settings["levels"]):
             key = (name, tuple(sorted(values.items())))
             if key not in integrators:
@@ -205,21 +210,38 @@ class Session:
                 integrators[key] = integrator
             width, height = max(1, size[0] // divisor), max(1, size[1] // divisor)
             self.message = f"{width} x {height}"
-            denoise = settings["denoise"] and divisor == 1
-            options = {"passes": DENOISED_PASSES, "flags": library.DENOISE} if denoise else {}
+            final = divisor == 1
+            denoise = final and settings["denoise"]
+            options = settings["final"] | {"flags": library.DENOISE if denoise else 0} if final else {}
             with library.Render(integrators[key], scene, width, height, **options) as render:
-                self._guarded(render, lambda: render.wait(library.FOREVER))
-                radiance, alpha = render.read("denoised" if denoise else "radiance"), render.read("alpha")
-            picture = np.ones((height, width, 4), np.float32)
-            if data.backdrop is not None:
-                radiance = radiance + (1 - alpha) * data.backdrop.seen(camera, width, height, (0, 0, width, height))
-            picture[..., :3] = radiance[::-1] * settings["exposure"]
-            if data.transparent:
-                picture[..., 3] = alpha[::-1, :, 0]
-            with self.condition:
-                self.picture = np.ascontiguousarray(np.minimum(picture, 60000.0))  # of half floats
-                self.picture_number += 1
-                self.levels_done = number + 1
+                self._guarded(render, lambda: self._follow(render, settings, camera))
+                self._show(render, settings, camera, "denoised" if denoise else "radiance")
+            self.levels_done = number + 1
+
+    def _follow(self, render, settings, camera):
+        """Waits for the end; meanwhile shows the mean of the passes so far."""
+        shown, passes_shown = time.perf_counter(), 0
+        while (status := render.wait(POLL_MS)).state == library.RUNNING:
+            if status.passes_total == 1 or status.passes_done == 0:
+                continue
+            self.message = f"iteration {status.passes_done + 1}" + (f"/{status.passes_total}" if status.passes_total else "")
+            if status.passes_done > passes_shown and time.perf_counter() > shown + SHOW_SECONDS:
+                self._show(render, settings, camera, "radiance")
+                shown, passes_shown = time.perf_counter(), status.passes_done
+
+    def _show(self, render, settings, camera, channel):
+        data = self.data
+        radiance, alpha = render.read(channel), render.read("alpha")
+        height, width = radiance.shape[:2]
+        picture = np.ones((height, width, 4), np.float32)
+        if data.backdrop is not None:
+            radiance = radiance + (1 - alpha) * data.backdrop.seen(camera, width, height, (0, 0, width, height))
+        picture[..., :3] = radiance[::-1] * settings["exposure"]
+        if data.transparent:
+            picture[..., 3] = alpha[::-1, :, 0]
+        with self.condition:
+            self.picture = np.ascontiguousarray(np.minimum(picture, 60000.0))  # of half floats
+            self.picture_number += 1
 
 
 def _tick():

@@ -77,6 +77,8 @@ def new_scene(width=32, height=32):
     camera.location = (0, 0, 5)
     scene.camera = camera
     settings = scene.lumicut
+    from lumicut_blender import migration
+    migration.migrate(settings)  # the library's own parameters: one plain pass
     settings.integrator = "exhaustive"
     settings.samples = 1
     return scene

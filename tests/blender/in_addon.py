@@ -33,7 +33,7 @@ class Registration(unittest.TestCase):
             addon_utils.disable("lumicut_blender")
             self.assertNotIn("LUMICUT", self.engines())
             self.assertFalse(hasattr(bpy.types.Scene, "lumicut"))
-            self.assertFalse(hasattr(bpy.types, "LUMICUT_PT_integrator"))
+            self.assertFalse(hasattr(bpy.types, "LUMICUT_PT_sampling"))
             self.assertFalse([p for p in bpy.types.Panel.__subclasses__()
                               if "LUMICUT" in getattr(p, "COMPAT_ENGINES", ())
                               and p.__module__.split(".")[0] != "lumicut_blender"])
@@ -188,7 +188,7 @@ class TheLibrary(unittest.TestCase):
 
     def test_imports_are_blenders_numpys_and_pythons_own(self):
         import sys
-        allowed = set(sys.stdlib_module_names) | {"bpy", "gpu", "gpu_extras", "bpy_extras", "mathutils", "numpy"}
+        allowed = set(sys.stdlib_module_names) | {"blf", "bl_operators", "bl_ui", "bpy", "gpu", "gpu_extras", "bpy_extras", "mathutils", "numpy"}
         for path in PACKAGE.glob("*.py"):
             for name in re.findall(r"^\s*(?:import|from)\s+([A-Za-z_]\w*)", path.read_text(), re.M):
                 self.assertIn(name, allowed, path.name)

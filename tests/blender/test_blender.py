@@ -6,6 +6,7 @@ import json
 import os
 import pathlib
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -26,7 +27,7 @@ PATIENCE = 900  # seconds until a hanging Blender is killed: not a measure of an
 
 BATCHES = {
     "units": ["in_light_units", "in_materials", "in_images", "in_programs"],
-    "scenes": ["in_addon", "in_cancel", "in_catchers", "in_collect", "in_export", "in_frames", "in_objects", "in_views"],
+    "scenes": ["in_addon", "in_cancel", "in_catchers", "in_collect", "in_export", "in_frames", "in_interface", "in_objects", "in_views"],
 }
 
 WRONG_LIBRARY = """
@@ -298,6 +299,21 @@ bpy.ops.render.render(write_still=True)
 """)
         self.assertTrue(image.exists())
 
+    def test_the_documented_command_installs_it_word_for_word(self):
+        text = (ROOT / "docs/blender.md").read_text()
+        command = re.search(r"`(blender -b --python-expr \"import bpy; bpy\.ops\.preferences\.addon_install.*?)`", text)[1]
+        words = shlex.split(command)
+        self.assertEqual(words[0], "blender")
+        name = re.search(r"lumicut_blender-[\d.]+\.zip", command)[0]
+        shutil.copy(self.archive, self.home.path / name)
+        env = {k: v for k, v in self.home.environment(library=None).items() if not k.startswith("BLENDER_USER")}
+        done = subprocess.run([BLENDER, *words[1:]], env=env, cwd=self.home.path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=PATIENCE)
+        self.assertNotIn("Traceback", done.stdout)
+        done = subprocess.run([BLENDER, "-b", "--python-exit-code", "7", "--python-expr", "from lumicut_blender import runtime\n"
+                               "assert runtime.require().origin == 'bundled with the add-on'"], env=env, cwd=self.home.path,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=PATIENCE)
+        self.assertEqual(done.returncode, 0, done.stdout)
+
     def test_it_installs_renders_and_exports_without_a_window(self):
         archive = self.archive
         done = self.home.python(
@@ -317,28 +333,60 @@ bpy.ops.render.render(write_still=True)
         self.assertTrue(out.exists())
 
 
-TOOLS = ("xvfb-run", "import", "xdotool")
+TOOLS = ("xvfb-run", "import", "xdotool", "convert")
+IMAGES = ROOT / "docs/images"
 
 
 @unittest.skipUnless(all(map(shutil.which, TOOLS)), f"one of {', '.join(TOOLS)} is not installed: the interface is not tested")
 class Interface(Blender):
-    """One run with a window, under Xvfb. Screenshots stay in the build's blender_screenshots."""
+    """Runs with a window, under Xvfb. Screenshots stay in the build's blender_screenshots; with LUMICUT_UPDATE_DOCS=1 they
+    become those of the documentation."""
+
+    def window(self, script, shots, size, *words):
+        """What Blender printed in a window of that size, running the script."""
+        shots.mkdir(parents=True, exist_ok=True)
+        done = subprocess.run(["xvfb-run", "-a", "-s", f"-screen 0 {size[0]}x{size[1]}x24", BLENDER, *map(str, words), "--addons", "lumicut_blender",
+                               "--window-geometry", "0", "0", *map(str, size), "--python", str(HERE / script)],
+                              env=self.home.environment() | {"LUMICUT_UI_OUT": str(shots)}, cwd=self.home.path,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", timeout=PATIENCE)
+        return done.stdout
+
+    def test_every_panel_opens_and_its_screenshots_are_those_of_the_documentation(self):
+        shots = BUILD / "blender_panels"
+        shutil.rmtree(shots, ignore_errors=True)
+        said = self.window("ui_panels.py", shots, (1920, 3300), "--factory-startup")
+        self.assertTrue((shots / "panels.json").exists(), said[-3000:])
+        result = json.loads((shots / "panels.json").read_text())
+        self.assertTrue(result.get("ok"), result.get("failure"))
+        self.assertNotIn("Traceback", said)  # a panel that fails to draw says so, and is empty
+        self.assertEqual(result["width"], 333)  # as the factory has it on a screen of 1920: labels are measured for it
+
+        def sheet(name, *tabs):
+            """Screenshots side by side, without what is empty at their ends, in 48 colours."""
+            path = shots / name
+            columns = [word for tab in tabs for word in ("(", str(shots / f"panels_{tab}.png"), "-trim", "+repage", "-bordercolor", "#303030", "-border", "4", ")")]
+            subprocess.run(["convert", "-background", "#303030", *columns, "-gravity", "north", "+append", "+dither", "-colors", "48",
+                            "-strip", f"PNG8:{path}"], check=True)
+            if os.environ.get("LUMICUT_UPDATE_DOCS"):
+                shutil.copy(path, IMAGES / name)
+            self.assertLess(path.stat().st_size, 150000)
+            size = [subprocess.run(["identify", "-format", "%w %h", p], capture_output=True, text=True, check=True).stdout
+                    for p in (path, IMAGES / name)]
+            self.assertEqual(*size, f"{name} is not that of today's panels: run this with LUMICUT_UPDATE_DOCS=1")
+
+        sheet("blender_panels.png", "render", "view_layer", "object")
+        sheet("blender_panels_data.png", "material", "light", "camera")
 
     def test_engine_render_cancel_and_viewport(self):
         shots = BUILD / "blender_screenshots"
         shutil.rmtree(shots, ignore_errors=True)
-        shots.mkdir(parents=True)
         blend = self.home.path / "room.blend"
         done = self.home.run("--factory-startup", "--addons", "lumicut_blender", "--python-exit-code", 7, "-P",
                              ROOT / "export_scripts/scenes/blender_indirect_room.py", "--",
                              "--output", blend, "--detail", 0, "--width", 640, "--height", 480)
         self.assertEqual(done.returncode, 0, done.stdout)
-        env = self.home.environment() | {"LUMICUT_UI_OUT": str(shots)}
-        done = subprocess.run(["xvfb-run", "-a", "-s", "-screen 0 1500x1000x24", BLENDER, blend, "--addons", "lumicut_blender",
-                               "--window-geometry", "0", "0", "1500", "1000", "--python", str(HERE / "ui_script.py")],
-                              env=env, cwd=self.home.path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                              errors="replace", timeout=PATIENCE)
-        self.assertTrue((shots / "result.json").exists(), done.stdout[-3000:])
+        said = self.window("ui_script.py", shots, (1500, 1000), blend)
+        self.assertTrue((shots / "result.json").exists(), said[-3000:])
         result = json.loads((shots / "result.json").read_text())
         sys.stderr.write(json.dumps(result, indent=1) + "\n")
         self.assertTrue(result.get("ok"), result.get("failure"))

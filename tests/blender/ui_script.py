@@ -133,6 +133,7 @@ def steps():
     for name in ("update", "_paint", "draw"):
         watch(viewport.Session, name)
     bpy.ops.lumicut.preset(preset="draft")
+    scene.lumicut.viewport_passes = 2
     view = area("VIEW_3D")
     space = view.spaces.active
     space.overlay.show_overlays = False
