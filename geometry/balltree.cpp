@@ -346,30 +346,15 @@ void BallTree::remove(uint32_t id) {
 
 double BallTree::total_volume() const {
   double sum = 0;
-  std::vector<uint32_t> stack;
-  if (root_ != kNone) stack.push_back(root_);
-  while (!stack.empty()) {
-    const Node& n = nodes_[stack.back()];
-    stack.pop_back();
-    if (n.leaf != kNone) continue;
-    sum += volume(n.radius);
-    stack.push_back(n.left);
-    stack.push_back(n.right);
-  }
+  for_each_ball([&](auto, double radius, size_t, uint32_t leaf) {
+    if (leaf == kNone) sum += volume(radius);
+  });
   return sum;
 }
 
 size_t BallTree::depth() const {
   size_t deepest = 0;
-  std::vector<std::pair<uint32_t, size_t>> stack;
-  if (root_ != kNone) stack.push_back({root_, 1});
-  while (!stack.empty()) {
-    const auto [n, level] = stack.back();
-    stack.pop_back();
-    deepest = std::max(deepest, level);
-    if (nodes_[n].leaf == kNone)
-      stack.push_back({nodes_[n].left, level + 1}), stack.push_back({nodes_[n].right, level + 1});
-  }
+  for_each_ball([&](auto, double, size_t level, uint32_t) { deepest = std::max(deepest, level + 1); });
   return deepest;
 }
 

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace lumicut {
@@ -41,6 +42,19 @@ class BallTree {
   // Sum of radius^d over inner nodes: the paper's measure of a tree (proportional to volume).
   double total_volume() const;
   size_t depth() const;
+  // fn(centre, radius, level, leaf) for every ball, from the root's (level 0) down; leaf: kNone for inner ones.
+  template <typename Fn>
+  void for_each_ball(Fn&& fn) const {
+    std::vector<std::pair<uint32_t, size_t>> stack;
+    if (root_ != kNone) stack.push_back({root_, 0});
+    while (!stack.empty()) {
+      const auto [n, level] = stack.back();
+      stack.pop_back();
+      fn(std::span(centre(n), static_cast<size_t>(dim_)), nodes_[n].radius, level, nodes_[n].leaf);
+      if (nodes_[n].leaf == kNone)
+        stack.push_back({nodes_[n].left, level + 1}), stack.push_back({nodes_[n].right, level + 1});
+    }
+  }
 
   // Leaves, ascending. Balls are closed.
   std::vector<uint32_t> containing(std::span<const double> centre, double radius) const;    // that hold the ball wholly

@@ -1,5 +1,6 @@
 #include "geometry/csv.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <istream>
@@ -9,9 +10,11 @@
 namespace lumicut {
 namespace {
 
-template <size_t N, typename Fn>
-void read_rows(std::istream& in, const std::string& name, const char* const (&fields)[N], Fn&& row) {
+// `fields`: names of the columns; none: as many as the first row of numbers has.
+template <typename Fn>
+void read_rows(std::istream& in, const std::string& name, std::vector<std::string> fields, Fn&& row) {
   std::string line;
+  std::vector<double> values(fields.size());
   for (size_t number = 1, rows = 0; std::getline(in, line); ++number) {
     const char *at = line.data(), *end = at + line.size();
     if (number == 1 && line.starts_with("\xef\xbb\xbf")) at += 3;  // byte-order mark
@@ -20,35 +23,37 @@ void read_rows(std::istream& in, const std::string& name, const char* const (&fi
     };
     skip();
     if (at == end || *at == '#') continue;
-    double values[N];
     const auto bad = [&](size_t k, const std::string& what) {
       fail_argument(name + ", line " + std::to_string(number) + ": " + fields[k] + " " + what);
     };
-    bool heading = false;
-    for (size_t k = 0; k < N; ++k) {
+    const auto is_number = [&] {
+      double first;
+      const auto r = std::from_chars(*at == '+' ? at + 1 : at, end, first);
+      return r.ec != std::errc::invalid_argument;
+    };
+    if (rows++ == 0 && !is_number()) continue;  // a heading
+    if (fields.empty()) {
+      const auto columns = static_cast<size_t>(std::count(at, end, ',') + 1);
+      for (size_t k = 0; k < columns; ++k) fields.push_back("column " + std::to_string(k + 1));
+      values.resize(columns);
+    }
+    for (size_t k = 0; k < fields.size(); ++k) {
       skip();
       if (at < end && *at == '+') ++at;
       const auto r = std::from_chars(at, end, values[k]);
       if (r.ec == std::errc::result_out_of_range) bad(k, "is " + std::string(at, r.ptr) + ", out of range");
-      if (r.ec != std::errc()) {
-        if (rows == 0 && k == 0) {
-          heading = true;
-          break;
-        }
-        bad(k, "is missing or not a number");
-      }
+      if (r.ec != std::errc()) bad(k, "is missing or not a number");
       if (!std::isfinite(values[k])) bad(k, "is " + std::string(at, r.ptr) + ", not a finite number");
       at = r.ptr;
       skip();
-      if (k + 1 < N) {
+      if (k + 1 < fields.size()) {
         if (at == end || *at != ',') bad(k + 1, "is missing");
         ++at;
       }
     }
-    ++rows;
-    if (heading) continue;
     if (at != end)
-      fail_argument(name + ", line " + std::to_string(number) + ": more than " + std::to_string(N) + " fields");
+      fail_argument(name + ", line " + std::to_string(number) + ": more than " + std::to_string(fields.size()) +
+                    " fields");
     row(values);
   }
 }
@@ -57,14 +62,32 @@ void read_rows(std::istream& in, const std::string& name, const char* const (&fi
 
 std::vector<Point2> read_points_csv(std::istream& in, const std::string& name) {
   std::vector<Point2> points;
-  read_rows(in, name, {"x", "y"}, [&](const double* v) { points.push_back({v[0], v[1]}); });
+  read_rows(in, name, {"x", "y"}, [&](const std::vector<double>& v) { points.push_back({v[0], v[1]}); });
   return points;
 }
 
 std::vector<Disk> read_disks_csv(std::istream& in, const std::string& name) {
   std::vector<Disk> disks;
-  read_rows(in, name, {"x", "y", "radius"}, [&](const double* v) { disks.push_back({{v[0], v[1]}, v[2]}); });
+  read_rows(in, name, {"x", "y", "radius"}, [&](const std::vector<double>& v) {
+    disks.push_back({{v[0], v[1]}, v[2]});
+  });
   return disks;
+}
+
+std::vector<double> read_numbers_csv(std::istream& in, const std::string& name, const std::string& field) {
+  std::vector<double> numbers;
+  read_rows(in, name, {field}, [&](const std::vector<double>& v) { numbers.push_back(v[0]); });
+  return numbers;
+}
+
+std::vector<double> read_table_csv(std::istream& in, const std::string& name, size_t& columns) {
+  std::vector<double> table;
+  columns = 0;
+  read_rows(in, name, {}, [&](const std::vector<double>& v) {
+    columns = v.size();
+    table.insert(table.end(), v.begin(), v.end());
+  });
+  return table;
 }
 
 }  // namespace lumicut

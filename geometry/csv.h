@@ -14,5 +14,8 @@ namespace lumicut {
 // Throw invalid_argument naming `name`, the line and the field on what is not a finite number.
 std::vector<Point2> read_points_csv(std::istream& in, const std::string& name);
 std::vector<Disk> read_disks_csv(std::istream& in, const std::string& name);
+std::vector<double> read_numbers_csv(std::istream& in, const std::string& name, const std::string& field);
+// Rows of as many numbers as the first one has: `columns` (0: there is none), row by row.
+std::vector<double> read_table_csv(std::istream& in, const std::string& name, size_t& columns);
 
 }  // namespace lumicut

@@ -506,6 +506,22 @@ bool FaceKmeans::teleport() {
   return split(worst) != kNone;
 }
 
+size_t FaceKmeans::refine(double error, size_t most) {
+  size_t count = cluster_count();
+  while (count<most&& this->error()> error) {
+    std::vector<std::pair<double, uint32_t>> worst;
+    for (uint32_t c = 0; c < faces_.size(); ++c)
+      if (faces_[c].size() > 1) worst.emplace_back(-error_of(faces_[c]), c);
+    if (worst.empty()) break;
+    std::sort(worst.begin(), worst.end());
+    worst.resize(std::min({worst.size(), std::max<size_t>(1, count / 8), most - count}));
+    for (const auto& [negative, c] : worst) split(c);
+    run(20);
+    count = cluster_count();
+  }
+  return count;
+}
+
 size_t FaceKmeans::cluster_count() const {
   return static_cast<size_t>(std::count_if(faces_.begin(), faces_.end(), [](const auto& f) { return !f.empty(); }));
 }

@@ -59,6 +59,9 @@ class FaceKmeans {
   uint32_t split(uint32_t c);
   // A merge where it costs least, then a split where the error is largest [region teleportation]. False: neither.
   bool teleport();
+  // Splits the clusters of largest error, an eighth of all in a round, with up to 20 iterations behind each, until
+  // error() is at most `error` or there are `most` clusters; returns how many there are.
+  size_t refine(double error, size_t most);
 
   const FaceMesh& mesh() const { return mesh_; }
   const DualGraph& graph() const { return graph_; }

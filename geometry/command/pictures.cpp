@@ -120,16 +120,16 @@ Picture draw_mesh(const FaceMesh& mesh, std::span<const Colour> colours, int wid
   return picture;
 }
 
-std::string draw_hitting_set(bool svg, std::span<const Point2> points, std::span<const Disk> disks,
-                             std::span<const uint32_t> chosen, int size) {
+std::string draw_circles(bool svg, std::span<const Point2> points, std::span<const Circle> circles,
+                         std::span<const uint32_t> chosen, int size) {
   Point2 lo{1e300, 1e300}, hi{-1e300, -1e300};
   const auto cover = [&](const Point2& p, double r) {
     lo = {std::min(lo.x, p.x - r), std::min(lo.y, p.y - r)};
     hi = {std::max(hi.x, p.x + r), std::max(hi.y, p.y + r)};
   };
   for (const Point2& p : points) cover(p, 0);
-  for (const Disk& d : disks) cover(d.centre, d.radius);
-  if (points.empty() && disks.empty()) lo = {0, 0}, hi = {1, 1};
+  for (const Circle& c : circles) cover(c.disk.centre, c.disk.radius);
+  if (points.empty() && circles.empty()) lo = {0, 0}, hi = {1, 1};
   const double scale = (size - 20) / std::max({hi.x - lo.x, hi.y - lo.y, 1e-300});
   const auto x_of = [&](const Point2& p) { return 10 + (p.x - lo.x) * scale; };
   const auto y_of = [&](const Point2& p) { return size - 10 - (p.y - lo.y) * scale; };
@@ -138,9 +138,10 @@ std::string draw_hitting_set(bool svg, std::span<const Point2> points, std::span
     std::ostringstream out;
     out << "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" << size << "\" height=\"" << size
         << "\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
-    for (const Disk& d : disks)
+    for (const auto& [d, c] : circles)
       out << "<circle cx=\"" << x_of(d.centre) << "\" cy=\"" << y_of(d.centre) << "\" r=\"" << d.radius * scale
-          << "\" fill=\"none\" stroke=\"#7a9ec2\" stroke-width=\"0.5\"/>\n";
+          << "\" fill=\"none\" stroke=\"rgb(" << +c[0] << ',' << +c[1] << ',' << +c[2]
+          << ")\" stroke-width=\"0.5\"/>\n";
     for (const Point2& p : points)
       out << "<circle cx=\"" << x_of(p) << "\" cy=\"" << y_of(p) << "\" r=\"" << dot << "\" fill=\"#909090\"/>\n";
     for (const uint32_t i : chosen)
@@ -150,17 +151,24 @@ std::string draw_hitting_set(bool svg, std::span<const Point2> points, std::span
     return std::move(out).str();
   }
   Picture picture(size, size, {255, 255, 255});
-  for (const Disk& d : disks) {
+  for (const auto& [d, c] : circles) {
     const int n = std::clamp(static_cast<int>(d.radius * scale * 4), 8, 4000);
     for (int k = 0; k < n; ++k) {
       const double t = 6.283185307179586 * k / n;
       picture.set(static_cast<int>(x_of(d.centre) + d.radius * scale * std::cos(t)),
-                  static_cast<int>(y_of(d.centre) + d.radius * scale * std::sin(t)), {122, 158, 194});
+                  static_cast<int>(y_of(d.centre) + d.radius * scale * std::sin(t)), c);
     }
   }
   for (const Point2& p : points) picture.dot(x_of(p), y_of(p), dot, {144, 144, 144});
   for (const uint32_t i : chosen) picture.dot(x_of(points[i]), y_of(points[i]), 1.6 * dot, {208, 32, 32});
   return png_of(picture);
+}
+
+std::string draw_hitting_set(bool svg, std::span<const Point2> points, std::span<const Disk> disks,
+                             std::span<const uint32_t> chosen, int size) {
+  std::vector<Circle> circles;
+  for (const Disk& d : disks) circles.push_back({d, {122, 158, 194}});
+  return draw_circles(svg, points, circles, chosen, size);
 }
 
 }  // namespace lumicut

@@ -32,7 +32,14 @@ Colour label_colour(uint32_t label);
 // The mesh from (1, .5, 2) of its box, z or y up, flat-shaded with a colour a face.
 Picture draw_mesh(const FaceMesh& mesh, std::span<const Colour> face_colours, int width, int height, bool z_up);
 
-// Disks as outlines, points grey, chosen points red: the bytes of an SVG or of a PNG.
+struct Circle {
+  Disk disk;
+  Colour colour;
+};
+// Circles as outlines, points grey, chosen points red: the bytes of an SVG or of a PNG.
+std::string draw_circles(bool svg, std::span<const Point2> points, std::span<const Circle> circles,
+                         std::span<const uint32_t> chosen, int size);
+// The same of an instance: its disks in blue.
 std::string draw_hitting_set(bool svg, std::span<const Point2> points, std::span<const Disk> disks,
                              std::span<const uint32_t> chosen, int size);
 

@@ -1,6 +1,7 @@
-// Points and disks of the geometry command.
+// Points, disks and tables of the geometry command.
 #include "geometry/csv.h"
 
+#include <cstdlib>
 #include <sstream>
 
 #include "core/error.h"
@@ -19,6 +20,13 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
         read_points_csv(in, "points.csv");
     } catch (const Error&) {
     }
+  }
+  std::istringstream in(text);
+  size_t columns = 0;
+  try {
+    const std::vector<double> table = read_table_csv(in, "table.csv", columns);
+    if (columns == 0 ? !table.empty() : table.size() % columns != 0) std::abort();
+  } catch (const Error&) {
   }
   return 0;
 }

@@ -1,0 +1,35 @@
+// The commands of lumicut-geometry: each adds itself, with its options, to the command line and returns what runs it.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <functional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "geometry/point2.h"
+
+namespace lumicut {
+
+using Command = std::function<int()>;
+
+Command add_balltree(CLI::App& app);
+Command add_hitting_set(CLI::App& app);
+Command add_hull(CLI::App& app);
+Command add_net(CLI::App& app);
+Command add_recluster(CLI::App& app);
+
+// A text file, "-": standard input.
+std::istringstream open_text(const std::string& path);
+// Refuses a place that cannot be written, before any work. "-" is standard output, "" is none.
+void check_output(const std::string& path);
+void write_text(const std::string& path, const std::string& text);
+// index,x,y
+void write_points(const std::string& path, const std::vector<Point2>& points, const std::vector<uint32_t>& chosen);
+
+double seconds_since(std::chrono::steady_clock::time_point start);
+// CLI::Range lets NaN pass.
+void check_finite(const char* option, double value);
+
+}  // namespace lumicut
