@@ -198,6 +198,8 @@ class LumicutEngine(bpy.types.RenderEngine):
         if self._denoised or passes.wants_denoising(layer):
             options["flags"] |= library.DENOISE | (0 if settings.firefly_filter else library.KEEP_FIREFLIES)
         passes.note_left_out(layer, report)
+        if layer.samples > 0:
+            report.note(layer.name, "Samples of view layers left out, which take the scene's")
         if layer.lumicut.use_pass_error and settings.passes == 1:
             report.note(layer.name, "Error passes that are 0, as a single pass cannot tell")
         return options

@@ -12,6 +12,7 @@ from .directions import Directions
 from .nodes import Value
 from .scene_data import Profile
 
+MANY_BOUNCES = 32  # of lamps: fewer is a choice that shows
 TYPES = {"POINT": library.POINT, "SPOT": library.SPOT, "SUN": library.SUN}
 AREA_TYPES = {"SQUARE": library.RECTANGLE, "RECTANGLE": library.RECTANGLE, "DISK": library.DISK, "ELLIPSE": library.DISK}
 
@@ -192,6 +193,8 @@ def convert_light(name, light, matrix, images, report, profiles):
         return None
     if getattr(light, "cycles", None) is not None and getattr(light.cycles, "is_portal", False):
         return None
+    if getattr(getattr(light, "cycles", None), "max_bounces", MANY_BOUNCES) < MANY_BOUNCES:
+        report.note(name, "Max Bounces of lamps left out")
     if not getattr(light, "use_shadow", True):
         report.note(name, "Lamps without shadows, which cast them here")
     m = np.array(matrix)[:3]

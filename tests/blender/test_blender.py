@@ -28,6 +28,7 @@ PATIENCE = 900  # seconds until a hanging Blender is killed: not a measure of an
 BATCHES = {
     "units": ["in_light_units", "in_materials", "in_images", "in_programs"],
     "scenes": ["in_addon", "in_cancel", "in_catchers", "in_collect", "in_export", "in_frames", "in_interface", "in_objects", "in_views"],
+    "status": ["in_status"],
 }
 
 WRONG_LIBRARY = """
@@ -49,7 +50,7 @@ class Home:
             (self.path / "scripts/addons/lumicut_blender").symlink_to(ROOT / "export_scripts/lumicut_blender")
 
     def environment(self, library=LIBRARY):
-        env = {k: v for k, v in os.environ.items() if not k.startswith(("BLENDER_USER", "LUMICUT_"))}
+        env = {k: v for k, v in os.environ.items() if not k.startswith(("BLENDER_USER", "LUMICUT_")) or k == "LUMICUT_UPDATE_DOCS"}
         env |= {"BLENDER_USER_SCRIPTS": str(self.path / "scripts"), "BLENDER_USER_CONFIG": str(self.path / "config"),
                 "BLENDER_USER_EXTENSIONS": str(self.path / "extensions"),
                 "LUMICUT_SOURCE_DIR": str(ROOT), "LUMICUT_BINARY_DIR": str(BUILD), "HOME": str(self.path),
@@ -118,6 +119,9 @@ class Batches(Blender):
 
     def test_scenes(self):
         self.batch("scenes")
+
+    def test_status(self):
+        self.batch("status")
 
 
 class Farms(Blender):
