@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <optional>
 
+#include "io/binary_block.h"
 #include "io/file_error.h"
 
 namespace lumicut::io {
@@ -74,8 +76,9 @@ class ProgramReader {
   Program program_;
 };
 
-std::vector<float> floats_of(const std::string& path, uint64_t most) {
-  const std::string bytes = read_whole_file(path, most * sizeof(float));
+std::vector<float> floats_of(const std::string& path, const std::optional<uint64_t>& offset, uint64_t most) {
+  const std::string bytes =
+      offset ? read_part(path, *offset, most * sizeof(float)) : read_whole_file(path, most * sizeof(float));
   if (bytes.size() % sizeof(float) != 0)
     throw FileError(path, fmt::format("has {} bytes, no multiple of 4", bytes.size()));
   std::vector<float> out(bytes.size() / sizeof(float));
@@ -89,6 +92,34 @@ std::vector<float> floats_of(const std::string& path, uint64_t most) {
 Program read_program(const JsonValue& value, const std::function<uint32_t(const std::string&)>& attribute,
                      const std::function<int32_t(const JsonValue&)>& image) {
   return ProgramReader(attribute, image).read(value);
+}
+
+nlohmann::ordered_json program_json(const Program& program, const std::function<std::string(uint32_t)>& attribute,
+                                    const std::function<nlohmann::ordered_json(uint32_t)>& image) {
+  using Json = nlohmann::ordered_json;
+  Json steps = Json::array();
+  for (const lumicut_instruction& from : program.instructions) {
+    Json step{{"op", kOps.at(from.op)}};
+    if (from.mode != 0) step["mode"] = from.mode;
+    size_t inputs = std::size(from.inputs);
+    while (inputs > 0 && from.inputs[inputs - 1] == 0) --inputs;  // the first step, or none
+    for (size_t i = 0; i < inputs; ++i) {
+      const int32_t input = from.inputs[i];
+      if (input >= 0) {
+        step["inputs"].push_back(input);
+        continue;
+      }
+      const float* c = &program.constants.at(3 * static_cast<size_t>(-1 - input));
+      step["inputs"].push_back(Json{double{c[0]}, double{c[1]}, double{c[2]}});
+    }
+    for (uint32_t i = 0; i < from.count; ++i) step["table"].push_back(double{program.table.at(from.data + i)});
+    if (from.op == LUMICUT_OP_ATTRIBUTE || (from.op == LUMICUT_OP_TRANSFORM && from.count == 0) ||
+        (from.op == LUMICUT_OP_NORMAL_MAP && from.mode == 1))
+      step["attribute"] = attribute(from.data);
+    if (from.op == LUMICUT_OP_IMAGE) step["image"] = image(from.data);
+    steps.push_back(std::move(step));
+  }
+  return steps;
 }
 
 std::vector<Attribute> read_attributes(const JsonValue& value, const Mesh& mesh, size_t instances,
@@ -107,7 +138,9 @@ std::vector<Attribute> read_attributes(const JsonValue& value, const Mesh& mesh,
     const auto file = object.find("file");
     const auto values = file ? *file : object.need("values");
     if (file) {
-      a.values = floats_of(resolve(*file), uint64_t{places} * a.components);
+      std::optional<uint64_t> offset;
+      if (const auto given = object.find("offset")) offset = static_cast<uint64_t>(given->integer(0, int64_t{1} << 53));
+      a.values = floats_of(resolve(*file), offset, uint64_t{places} * a.components);
     } else {
       for (const auto& number : values.elements())
         a.values.push_back(static_cast<float>(number.number(-kLargest, kLargest)));

@@ -29,6 +29,9 @@ struct Texture {
   std::optional<Program> program;                // in an image's place; then there are no texels
 };
 
+// Names of the bits of a mesh's mask, from LUMICUT_CAMERA_RAYS on.
+inline constexpr const char* kRayKinds[] = {"camera", "diffuse", "glossy", "transmission", "shadow"};
+
 // What programs ask of a mesh, as lumicut_attribute has it.
 struct Attribute {
   uint32_t id = 0, components = 0, domain = 0;

@@ -9,6 +9,8 @@
 #include <map>
 #include <set>
 
+#include "io/affine.h"
+#include "io/binary_block.h"
 #include "io/file_error.h"
 #include "io/ies_file.h"
 #include "io/json_reader.h"
@@ -26,21 +28,6 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr uint64_t kMaxSceneBytes = uint64_t{1} << 30;
-
-using Vec = std::array<double, 3>;
-
-Vec operator+(const Vec& a, const Vec& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-Vec operator-(const Vec& a, const Vec& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Vec operator*(const Vec& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
-double dot(const Vec& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec cross(const Vec& a, const Vec& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-double length(const Vec& a) { return std::sqrt(dot(a, a)); }
-
-void store(float* out, const Vec& v) {
-  for (size_t k = 0; k < 3; ++k) out[k] = static_cast<float>(v[k]);
-}
 
 double radians(double degrees) { return degrees * kPi / 180.0; }
 
@@ -455,6 +442,14 @@ class SceneReader {
     } else {
       placed.push_back(base);
     }
+    // As the library has them, an only one too.
+    const auto transforms = object.find("transforms");
+    std::vector<float> kept;
+    if (transforms) {
+      if (object.has("transform") || object.has("instances"))
+        transforms->fail("stands beside \"transform\" or \"instances\"");
+      kept = read_transforms(*transforms);
+    }
     const uint32_t light_group = group(object), mask = ray_mask(object);
     const auto attributes = object.find("attributes");
     const size_t first = scene_.meshes.size();
@@ -469,7 +464,7 @@ class SceneReader {
     if (attributes) {
       if (scene_.meshes.size() != first + 1) attributes->fail("needs a file of one object");
       scene_.meshes[first].attributes = read_attributes(
-          *attributes, scene_.meshes[first], placed.size(),
+          *attributes, scene_.meshes[first], transforms ? kept.size() / 12 : placed.size(),
           [&](const std::string& attribute) { return attribute_number(attribute); },
           [&](const JsonValue& file) { return resolve(file); });
     }
@@ -478,34 +473,45 @@ class SceneReader {
       mesh.name = name.empty() ? value.path() : name;
       mesh.group = light_group;
       mesh.mask = mask;
+      mesh.transforms = kept;
       place(value, mesh, placed);
     }
   }
 
+  std::vector<float> read_transforms(const JsonValue& value) {
+    std::vector<float> out = block<float>(value, 12);
+    if (out.empty()) value.fail("is empty");
+    check_coordinates(value, out);
+    for (size_t t = 0; t < out.size(); t += 12) {
+      const float* m = &out[t];
+      const Vec x{m[0], m[4], m[8]}, y{m[1], m[5], m[9]}, z{m[2], m[6], m[10]};
+      if (!(std::abs(dot(cross(x, y), z)) > 0)) value.fail(fmt::format("transform {} flattens space", t / 12));
+      for (const size_t k : {3u, 7u, 11u}) out[t + k] = checked(value, double{m[k]} * scale_);
+    }
+    return out;
+  }
+
   // Of a mesh that some kinds of rays do not see. 0: all do.
   static uint32_t ray_mask(JsonObject& object) {
-    static constexpr std::pair<std::string_view, uint32_t> kKinds[] = {{"camera", LUMICUT_CAMERA_RAYS},
-                                                                       {"diffuse", LUMICUT_DIFFUSE_RAYS},
-                                                                       {"glossy", LUMICUT_GLOSSY_RAYS},
-                                                                       {"transmission", LUMICUT_TRANSMISSION_RAYS},
-                                                                       {"shadow", LUMICUT_SHADOW_RAYS}};
     const auto hidden = object.find("hidden_from");
     if (!hidden) return 0;
     uint32_t mask = ~uint32_t{0};
     for (const auto& kind : hidden->elements()) {
       const std::string name = kind.text();
-      const auto* known = std::ranges::find(kKinds, name, &std::pair<std::string_view, uint32_t>::first);
-      if (known == std::end(kKinds))
+      const auto* known = std::ranges::find(kRayKinds, name);
+      if (known == std::end(kRayKinds))
         kind.fail(fmt::format(
             "is \"{}\", but must be \"camera\", \"diffuse\", \"glossy\", \"transmission\" or \"shadow\"", name));
-      mask &= ~known->second;
+      mask &= ~(uint32_t{1} << (known - std::begin(kRayKinds)));
     }
     return mask;
   }
 
   // One instance is baked into the vertices; more become the mesh's transforms. `unit_scale` goes into the vertices.
   void place(const JsonValue& value, Mesh& mesh, std::vector<Matrix> placed) {
-    if (placed.size() == 1) {
+    if (!mesh.transforms.empty()) {
+      // Placed by them.
+    } else if (placed.size() == 1) {
       if (placed[0] != kIdentity) bake(value, mesh, placed[0]);
     } else {
       for (auto& m : placed) {
@@ -599,26 +605,44 @@ class SceneReader {
     return numbers;
   }
 
+  // A list in the scene file, or a part of a file.
+  template <typename T>
+  std::vector<T> block(const JsonValue& value, size_t width) {
+    return read_block<T>(value, width, [&](const JsonValue& file) { return resolve(file); });
+  }
+  static void check_coordinates(const JsonValue& value, const std::vector<float>& numbers) {
+    for (size_t i = 0; i < numbers.size(); ++i)
+      if (!(std::abs(numbers[i]) <= static_cast<float>(kLargestCoordinate)))
+        value.fail(fmt::format("its number {} is {}, not finite or beyond {:g}", i, numbers[i], kLargestCoordinate));
+  }
+
   void read_inline_mesh(JsonObject& object) {
     Mesh mesh;
-    const auto append = [](const JsonValue& list, std::vector<float>& out, size_t count) {
+    const auto append = [&](const JsonValue& list, std::vector<float>& out, size_t count) {
+      if (list.raw().is_object()) {
+        out = block<float>(list, count);
+        check_coordinates(list, out);
+        return true;
+      }
       for (const auto& element : list.elements())
         for (const double x : element.numbers(count, -kLargestCoordinate, kLargestCoordinate))
           out.push_back(static_cast<float>(x));
+      return false;
     };
     append(object.need("positions"), mesh.positions, 3);
     const auto vertices = static_cast<int64_t>(mesh.positions.size() / 3);
     if (vertices == 0) object.need("positions").fail("is empty");
     const auto per_vertex = [&](const char* key, std::vector<float>& out, size_t count) {
       const auto list = object.find(key);
-      if (!list) return;
-      append(*list, out, count);
+      if (!list) return false;
+      const bool as_it_is = append(*list, out, count);
       if (static_cast<int64_t>(out.size() / count) != vertices)
         list->fail(fmt::format("has {} entries for {} positions", out.size() / count, vertices));
+      return as_it_is;
     };
-    per_vertex("normals", mesh.normals, 3);
+    const bool as_they_are = per_vertex("normals", mesh.normals, 3);
     per_vertex("uvs", mesh.uvs, 2);
-    for (size_t i = 0; i + 2 < mesh.normals.size(); i += 3) {
+    for (size_t i = 0; i + 2 < mesh.normals.size() && !as_they_are; i += 3) {
       const Vec n{mesh.normals[i], mesh.normals[i + 1], mesh.normals[i + 2]};
       if (!(length(n) > 0)) object.need("normals").fail(fmt::format("[{}] is zero", i / 3));
       store(&mesh.normals[i], n * (1.0 / length(n)));
@@ -626,6 +650,12 @@ class SceneReader {
     const auto faces = [&](const char* key, size_t corners) {
       const auto list = object.find(key);
       if (!list) return;
+      if (corners == 3 && list->raw().is_object()) {
+        mesh.indices = block<uint32_t>(*list, 3);
+        for (const uint32_t i : mesh.indices)
+          if (i >= vertices) list->fail(fmt::format("names vertex {} of {}", i, vertices));
+        return;
+      }
       for (const auto& face : list->elements()) {
         const auto elements = face.elements();
         if (elements.size() != corners) face.fail_expected(fmt::format("an array of {} vertex numbers", corners));
@@ -638,8 +668,33 @@ class SceneReader {
     faces("triangles", 3);
     faces("quads", 4);
     if (mesh.indices.empty()) object.value().fail("has no \"triangles\" and no \"quads\"");
-    mesh.materials.assign(mesh.indices.size() / 3, material(object.need("material")));
+    read_mesh_materials(object, mesh);
     scene_.meshes.push_back(std::move(mesh));
+  }
+
+  // One for all triangles, or a list, and each triangle's number in it.
+  void read_mesh_materials(JsonObject& object, Mesh& mesh) {
+    const size_t triangles = mesh.indices.size() / 3;
+    const auto given = object.need("material");
+    if (!given.raw().is_array()) {
+      mesh.materials.assign(triangles, material(given));
+      return;
+    }
+    std::vector<uint32_t> list;
+    for (const auto& name : given.elements()) list.push_back(material(name));
+    const auto of_triangles = object.need("triangle_materials");
+    if (of_triangles.raw().is_object()) {
+      mesh.materials = block<uint32_t>(of_triangles, 1);
+    } else {
+      for (const auto& number : of_triangles.elements())
+        mesh.materials.push_back(static_cast<uint32_t>(number.integer(0, int64_t{1} << 31)));
+    }
+    if (mesh.materials.size() != triangles)
+      of_triangles.fail(fmt::format("has {} entries for {} triangles", mesh.materials.size(), triangles));
+    for (uint32_t& m : mesh.materials) {
+      if (m >= list.size()) of_triangles.fail(fmt::format("names material {} of {}", m, list.size()));
+      m = list[m];
+    }
   }
 
   // ---- Lights ----
@@ -666,6 +721,7 @@ class SceneReader {
         light.spot_cosine = object.boolean("cosine", false);
       }
       if (auto file = object.find("ies")) read_profile(object, *file, light);
+      if (auto given = object.find("profile")) read_plain_profile(object, *given, light);
     } else {
       read_area_light(object, light);
       return;
@@ -703,6 +759,30 @@ class SceneReader {
     if (same == scene_.profiles.end()) scene_.profiles.push_back(std::move(profile));
     light.type = LUMICUT_POINT;
     light.angle = light.blend = 0, light.spot_cosine = 0;
+  }
+
+  // The table itself, in W/sr; angles in degrees.
+  void read_plain_profile(JsonObject& object, const JsonValue& value, lumicut_light& light) {
+    if (light.type != LUMICUT_POINT || light.radius > 0 || object.has("ies"))
+      value.fail("is of a point light without \"radius\" and \"ies\"");
+    store(light.direction, direction(object.need("direction")));
+    JsonObject keys(value);
+    Profile profile;
+    profile.file = value.path();
+    const auto list = [&](const char* key, std::vector<float>& out, double most, double unit) {
+      for (const auto& number : keys.need(key).elements())
+        out.push_back(static_cast<float>(number.number(0, most) * unit));
+    };
+    list("vertical", profile.vertical, 180.001, kPi / 180), list("horizontal", profile.horizontal, 360.001, kPi / 180);
+    list("values", profile.values, 1e20, 1);
+    const auto tangent = keys.need("tangent").numbers(3, -kLargestCoordinate, kLargestCoordinate);
+    for (size_t k = 0; k < 3; ++k) light.tangent[k] = static_cast<float>(tangent[k]);
+    keys.finish();
+    if (profile.values.empty() || profile.values.size() != profile.vertical.size() * profile.horizontal.size())
+      value.fail(fmt::format("has {} values for {} by {} angles", profile.values.size(), profile.vertical.size(),
+                             profile.horizontal.size()));
+    scene_.profiles.push_back(std::move(profile));
+    light.profile = static_cast<uint32_t>(scene_.profiles.size());
   }
 
   // The table times the spot's falloff, at its own angles and, where the edge is, at finer ones.

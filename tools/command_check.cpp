@@ -108,7 +108,7 @@ void add_check(CLI::App& app) {
   auto* command =
       app.add_subcommand("check", "What a scene holds, what looks wrong in it, what rendering it will cost");
   const auto o = std::make_shared<Options>();
-  command->add_option("scene", o->scene, "Scene: JSON, glTF, OBJ, FBX, COLLADA or PLY (docs/formats.md)")->required();
+  command->add_option("scene", o->scene, kSceneHelp)->required();
   add_setup_options(*command, *o);
   command->add_option("--size", o->size, "WIDTHxHEIGHT in pixels (default: the scene's)");
   command->add_option("--spp", o->samples, "Samples a pixel (default: the scene's)")->check(CLI::Range(1, 65536));

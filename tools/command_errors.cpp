@@ -293,7 +293,7 @@ void add_errors(CLI::App& app) {
   auto* command = app.add_subcommand(
       "errors", "Where an image's error comes from: clustering, sampling of the virtual lights, clamping");
   const auto o = std::make_shared<Options>();
-  command->add_option("scene", o->scene, "Scene: JSON, glTF, OBJ, FBX, COLLADA or PLY (docs/formats.md)")->required();
+  command->add_option("scene", o->scene, kSceneHelp)->required();
   add_setup_options(*command, *o);
   command->add_option("--size", o->size, "WIDTHxHEIGHT in pixels (default: the scene's)");
   command->add_option("--sets", o->sets, "Further sets of virtual lights, whose mean is their expectation")

@@ -274,7 +274,7 @@ class FlythroughCommand {
 void add_flythrough(CLI::App& app) {
   auto* command = app.add_subcommand("flythrough", "Render many cameras in one scene, prepared once");
   const auto o = std::make_shared<Options>();
-  command->add_option("scene", o->scene, "Scene: JSON, glTF, OBJ, FBX, COLLADA or PLY (docs/formats.md)")->required();
+  command->add_option("scene", o->scene, kSceneHelp)->required();
   command->add_option("cameras", o->cameras, "Cameras, JSON: docs/command_line.md")->required();
   add_setup_options(*command, *o);
   command->add_option("-o,--output", o->output, "EXR to write for each view: a.exr becomes a.0000.exr, ...");

@@ -495,7 +495,7 @@ class RenderCommand {
 void add_render(CLI::App& app) {
   auto* command = app.add_subcommand("render", "Render a scene file");
   const auto o = std::make_shared<Options>();
-  command->add_option("scene", o->scene, "Scene: JSON, glTF, OBJ, FBX, COLLADA or PLY (docs/formats.md)")->required();
+  command->add_option("scene", o->scene, kSceneHelp)->required();
   add_setup_options(*command, *o);
   command->add_option("-o,--output", o->output, "EXR to write");
   add_png_options(*command, o->png, o->exposure);

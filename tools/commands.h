@@ -66,6 +66,7 @@ void print_error(fmt::format_string<T...> format, T&&... values) {
 void add_render(CLI::App& app);
 void add_flythrough(CLI::App& app);
 void add_compare(CLI::App& app);
+void add_convert(CLI::App& app);
 void add_mix(CLI::App& app);
 void add_bench(CLI::App& app);
 void add_report(CLI::App& app);

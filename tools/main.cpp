@@ -52,6 +52,7 @@ int run(int argc, char** argv, int& output_error) {
       "  lumicut render scene.json -i exhaustive -o ref.exr   the same from all lights: the reference\n"
       "  lumicut compare out.exr ref.exr                      how far the one is from the other\n"
       "  lumicut errors scene.json -i lightcuts               what its error is made of\n"
+      "  lumicut convert room.fbx room.json                   a scene of another program as JSON\n"
       "  lumicut mix out.exr --gain 1=0.5 -o mixed.exr        one lamp dimmed, without a render\n"
       "  lumicut bench plan.json -o out/bench                 scenes and methods: times, counts, errors\n"
       "  lumicut report out/bench/results.json -o page.html   the same as a page\n");
@@ -64,6 +65,7 @@ int run(int argc, char** argv, int& output_error) {
   add_flythrough(app);
   add_compare(app);
   add_errors(app);
+  add_convert(app);
   add_mix(app);
   add_bench(app);
   add_report(app);
