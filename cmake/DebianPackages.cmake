@@ -42,11 +42,22 @@ License: Apache-2.0
  On Debian systems the text of the Apache License, version 2.0, is in
  /usr/share/common-licenses/Apache-2.0.
 ")
+file(READ ${docs}/copyright copyright)
+file(WRITE ${docs}/gpl/copyright "${copyright}
+Comment: The program in this package has parts of CGAL in it, which are under the
+ GPL, version 3 or later: so is the whole. The text of that license is in
+ /usr/share/common-licenses/GPL-3.
+")
 
-# lumicut_package(COMPONENT PACKAGE SECTION SUMMARY TEXT [ARCHITECTURE_ALL] [DEPENDS ...])
+# lumicut_package(COMPONENT PACKAGE SECTION SUMMARY TEXT [ARCHITECTURE_ALL] [GPL] [DEPENDS ...])
 function(lumicut_package component package section summary text)
-  cmake_parse_arguments(ARG "ARCHITECTURE_ALL" "DEPENDS;RECOMMENDS" "" ${ARGN})
-  install(FILES ${docs}/changelog.Debian.gz ${docs}/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package} COMPONENT ${component})
+  cmake_parse_arguments(ARG "ARCHITECTURE_ALL;GPL" "DEPENDS;RECOMMENDS" "" ${ARGN})
+  if(ARG_GPL)
+    set(copyright ${docs}/gpl/copyright)
+  else()
+    set(copyright ${docs}/copyright)
+  endif()
+  install(FILES ${docs}/changelog.Debian.gz ${copyright} DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package} COMPONENT ${component})
   string(TOUPPER ${component} upper)
   set(prefix CPACK_DEBIAN_${upper}_PACKAGE)
   set(${prefix}_NAME ${package} PARENT_SCOPE)
@@ -81,5 +92,30 @@ lumicut_package(blender lumicut-blender graphics "many-lights global illuminatio
   ARCHITECTURE_ALL DEPENDS "blender (>= 3.4), python3-numpy, liblumicut${PROJECT_VERSION_MAJOR} (>= ${PROJECT_VERSION})")
 lumicut_package(python python3-lumicut python "many-lights global illumination from Python"
   "${what}\n This is for scripts and notebooks, with scenes and images as arrays."
-  ARCHITECTURE_ALL DEPENDS "python3, python3-numpy, liblumicut${PROJECT_VERSION_MAJOR} (>= ${PROJECT_VERSION})")
+  ARCHITECTURE_ALL DEPENDS "python3, python3-numpy, liblumicut${PROJECT_VERSION_MAJOR} (>= ${PROJECT_VERSION})"
+  RECOMMENDS "liblumicut-geometry${PROJECT_VERSION_MAJOR}")
+if(TARGET lumicut_geometry_api)
+  set(geometry "These are ball trees, sliding convex hulls, hitting sets, face clusters and
+ agglomeration, from the papers on many lights and their geometry.")
+  file(WRITE ${docs}/geometry/shlibs "liblumicut_geometry ${PROJECT_VERSION_MAJOR} liblumicut-geometry${PROJECT_VERSION_MAJOR} (>= ${PROJECT_VERSION})\n")
+  lumicut_package(geometry liblumicut-geometry${PROJECT_VERSION_MAJOR} libs "geometry of many lights, shared library"
+    "${geometry}\n This is the library, behind a C interface.")
+  set(CPACK_DEBIAN_GEOMETRY_PACKAGE_CONTROL_EXTRA ${docs}/geometry/shlibs ${docs}/triggers)
+  set(of_development "liblumicut-geometry${PROJECT_VERSION_MAJOR} ${exactly}")
+  if(TARGET lumicut_geometry_cgal_api)
+    file(WRITE ${docs}/geometry_cgal/shlibs
+      "liblumicut_geometry_cgal ${PROJECT_VERSION_MAJOR} liblumicut-geometry-cgal${PROJECT_VERSION_MAJOR} (>= ${PROJECT_VERSION})\n")
+    lumicut_package(geometry_cgal liblumicut-geometry-cgal${PROJECT_VERSION_MAJOR} libs "geometry of many lights, what needs CGAL"
+      "${geometry}\n This adds epsilon-nets, and hitting sets by them." GPL
+      DEPENDS "liblumicut-geometry${PROJECT_VERSION_MAJOR} ${exactly}")
+    set(CPACK_DEBIAN_GEOMETRY_CGAL_PACKAGE_CONTROL_EXTRA ${docs}/geometry_cgal/shlibs ${docs}/triggers)
+    string(APPEND of_development ", liblumicut-geometry-cgal${PROJECT_VERSION_MAJOR} ${exactly}")
+  endif()
+  lumicut_package(geometry_development liblumicut-geometry-dev libdevel "geometry of many lights, files for development"
+    "${geometry}\n These are the header, and files for CMake and pkg-config." DEPENDS "${of_development}")
+endif()
+if(TARGET lumicut-geometry)
+  lumicut_package(geometry_command lumicut-geometry science "geometry of many lights, command"
+    "${geometry}\n This is the command, on files of points, disks and meshes." GPL)
+endif()
 include(CPack)

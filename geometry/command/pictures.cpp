@@ -152,7 +152,7 @@ std::string draw_circles(bool svg, std::span<const Point2> points, std::span<con
   }
   Picture picture(size, size, {255, 255, 255});
   for (const auto& [d, c] : circles) {
-    const int n = std::clamp(static_cast<int>(d.radius * scale * 4), 8, 4000);
+    const int n = std::clamp(static_cast<int>(d.radius * scale * 7), 8, 40000);
     for (int k = 0; k < n; ++k) {
       const double t = 6.283185307179586 * k / n;
       picture.set(static_cast<int>(x_of(d.centre) + d.radius * scale * std::cos(t)),
