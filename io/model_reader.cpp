@@ -16,6 +16,7 @@
 #include "io/affine.h"
 #include "io/model.h"
 #include "io/text_lines.h"
+#include "io/vertex_colours.h"
 
 namespace lumicut::io {
 
@@ -24,6 +25,8 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr int kDeepest = 256;
 constexpr size_t kMostNodes = 1 << 22;
+
+double linear_of_srgb(double c) { return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4); }
 
 Affine affine(const aiMatrix4x4& m) {
   Affine out;
@@ -201,7 +204,9 @@ class Reader {
              fmt::format("mesh \"{}\": a normal has no length; taken as flat", out.name));
     }
     if (from.HasTextureCoords(0)) add(out.uvs, from.mTextureCoords[0], 2, "texture coordinate");
-    if (from.HasVertexColors(0)) leave_out(fmt::format("mesh \"{}\": colours of vertices", out.name));
+    if (from.mMaterialIndex >= model_.scene.materials.size())
+      throw FileError(path_, "a mesh names a material that is not there");
+    if (from.HasVertexColors(0)) read_colours(from, out);
     for (unsigned i = 0; i < from.mNumFaces; ++i) {
       const aiFace& face = from.mFaces[i];
       if (face.mNumIndices != 3) continue;
@@ -212,11 +217,22 @@ class Reader {
         out.indices.push_back(face.mIndices[k]);
       }
     }
-    if (from.mMaterialIndex >= model_.scene.materials.size())
-      throw FileError(path_, "a mesh names a material that is not there");
     if (from.HasBones()) leave_out(fmt::format("mesh \"{}\": bones", out.name));
     out.materials.assign(out.indices.size() / 3, from.mMaterialIndex);
     model_.scene.meshes.push_back(std::move(out));
+  }
+
+  // PLY has no other colour. In FBX and COLLADA they may be anything: masks, weights, shadows.
+  void read_colours(const aiMesh& from, Mesh& out) {
+    if (ending_ != ".ply") return leave_out(fmt::format("mesh \"{}\": colours of vertices", out.name));
+    Attribute colours;
+    colours.id = VertexColours::kAttribute;
+    colours.components = 3, colours.domain = LUMICUT_OF_VERTICES;
+    for (unsigned i = 0; i < from.mNumVertices; ++i)
+      for (unsigned k = 0; k < 3; ++k)
+        colours.values.push_back(static_cast<float>(linear_of_srgb(share(from.mColors[0][i][k]))));
+    out.attributes.push_back(std::move(colours));
+    for (float& c : model_.scene.materials.at(from.mMaterialIndex).values.diffuse) c = 1;
   }
 
   // ---- Nodes

@@ -17,6 +17,7 @@
 #include "io/scene_defaults.h"
 #include "io/texture_store.h"
 #include "io/unpack_folder.h"
+#include "io/vertex_colours.h"
 
 namespace lumicut::io {
 
@@ -43,7 +44,7 @@ Affine placed(const Vec& move, const std::array<double, 4>& q, const Vec& scale)
 
 class Reader {
  public:
-  explicit Reader(const std::string& path) : path_(path), textures_(scene_.textures) {}
+  explicit Reader(const std::string& path) : path_(path), textures_(scene_.textures), coloured_(scene_) {}
 
   SceneData read() {
     check_regular_file(path_);
@@ -305,7 +306,6 @@ class Reader {
       return found == from.attributes.end() ? -1 : found->second;
     };
     if (attribute("POSITION") < 0) return;
-    if (attribute("COLOR_0") >= 0) leave_out(where + ": colours of vertices");
     if (!from.targets.empty()) leave_out(where + ": morph targets");
     const auto add = [&](std::vector<float>& to, const std::vector<double>& values) {
       for (const double v : values) to.push_back(static_cast<float>(v));
@@ -354,8 +354,25 @@ class Reader {
       else
         triangle(order[i], order[i + (odd ? 2 : 1)], order[i + (odd ? 1 : 2)]);
     }
-    const auto number = static_cast<uint32_t>(material >= 0 ? static_cast<size_t>(material) : model_.materials.size());
+    auto number = static_cast<uint32_t>(material >= 0 ? static_cast<size_t>(material) : model_.materials.size());
+    if (attribute("COLOR_0") >= 0) number = read_colours(attribute("COLOR_0"), number, vertices, where, out);
     out.materials.assign(out.indices.size() / 3, number);
+  }
+
+  // The material that shows them.
+  uint32_t read_colours(int index, uint32_t material, size_t vertices, const std::string& where, Mesh& out) {
+    Attribute colours;
+    colours.id = VertexColours::kAttribute, colours.domain = LUMICUT_OF_VERTICES;
+    colours.components = at(model_.accessors, index, where + ".COLOR_0").type == TINYGLTF_TYPE_VEC4 ? 4 : 3;
+    for (const double v : numbers(index, static_cast<int>(colours.components), where + ".COLOR_0"))
+      colours.values.push_back(share(v, where + ".COLOR_0"));
+    if (colours.values.size() != vertices * colours.components)
+      fail(where, "its attributes have different numbers of elements");
+    const std::string mode = material < model_.materials.size() ? model_.materials[material].alphaMode : "OPAQUE";
+    if (mode == "MASK" && colours.components == 4) leave_out(where + ": opacities of vertices");
+    const bool alpha = mode == "BLEND" && colours.components == 4;
+    out.attributes.push_back(std::move(colours));
+    return coloured_.material(material, alpha);
   }
 
   // ---- Nodes
@@ -491,6 +508,7 @@ class Reader {
   gltf::Model model_;
   UnpackFolder folder_;
   TextureStore textures_;
+  VertexColours coloured_;
   std::map<std::pair<int, size_t>, int32_t> channels_;
   std::vector<size_t> first_;  // of a mesh's primitives in scene_.meshes; one more at the end
   bool has_camera_ = false;

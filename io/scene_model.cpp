@@ -16,6 +16,7 @@
 #include "io/text_lines.h"
 #include "io/texture_store.h"
 #include "io/unpack_folder.h"
+#include "io/vertex_colours.h"
 
 namespace lumicut::io {
 
@@ -58,7 +59,7 @@ std::vector<int32_t> read_textures(const Model& model, const std::string& path, 
   return numbers;
 }
 
-SceneData read_by_assimp(const std::string& path) {
+Model read_by_assimp(const std::string& path) {
   check_regular_file(path);
   const std::string reader = fmt::format("the reader of {} files", ending_of(path).substr(1));
   const std::string bytes = isolated(path, reader, kSeconds, [&] {
@@ -70,6 +71,11 @@ SceneData read_by_assimp(const std::string& path) {
   Model model;
   Unpacker unpacker(bytes, path);
   pack(unpacker, model);
+  return model;
+}
+
+SceneData read_model_scene(const std::string& path) {
+  Model model = read_by_assimp(path);
   SceneData scene = std::move(model.scene);
   for (const auto& [kind, text] : model.warnings) scene.warnings.add(kind, path, text);
   const auto numbers = read_textures(model, path, scene);
@@ -79,6 +85,10 @@ SceneData read_by_assimp(const std::string& path) {
          {&m.diffuse_texture, &m.specular_texture, &m.opacity_texture, &m.emission_texture, &m.normal_texture})
       if (*t > 0) *t = numbers.at(static_cast<size_t>(*t) - 1);
   }
+  VertexColours coloured(scene);
+  for (Mesh& mesh : scene.meshes)
+    if (!mesh.attributes.empty())
+      for (uint32_t& m : mesh.materials) m = coloured.material(m, false);
   if (!model.has_camera) frame_scene(scene);
   return scene;
 }
@@ -101,8 +111,17 @@ bool is_model(const std::string& path) {
   return kEndings.count(ending_of(path)) != 0;
 }
 
+std::vector<Mesh> read_model_meshes(const std::string& path, Warnings& warnings) {
+  if (ending_of(path) == ".obj") {
+    std::vector<Texture> none;
+    TextureStore textures(none);
+    return read_obj(path, {.read_materials = false}, textures, warnings).meshes;
+  }
+  return read_by_assimp(path).scene.meshes;
+}
+
 SceneData read_model(const std::string& path) {
-  SceneData scene = ending_of(path) == ".obj" ? read_obj_scene(path) : read_by_assimp(path);
+  SceneData scene = ending_of(path) == ".obj" ? read_obj_scene(path) : read_model_scene(path);
   if (!is_lit(scene)) add_sky(scene);
   scene.file = path;
   return scene;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "io/scene_data.h"
 
@@ -12,5 +13,8 @@ bool is_model(const std::string& path);  // by its ending
 
 // Throws FileError, which names the file.
 SceneData read_model(const std::string& path);
+
+// Its meshes alone, for scene files that name it; their materials mean nothing. Throws FileError.
+std::vector<Mesh> read_model_meshes(const std::string& path, Warnings& warnings);
 
 }  // namespace lumicut::io

@@ -144,6 +144,28 @@ class Gltf(cli.Cli):
             found = "".join(letters[tuple(image[f"albedo.{c}"][i] > 0.5 for c in "RGB")] for i in (0, 3, 12, 15))
             self.assertEqual(found, expected, transform)
 
+    def test_colours_of_vertices_multiply_the_base_colour_and_its_texture(self):
+        (self.folder / "grey.png").write_bytes(png(1, 1, [(188, 188, 188)]))  # .5 in linear light
+        for letters, values in (("f", [0.2, 0.4, 0.8] * 4), ("H", [13107, 26214, 52428, 65535] * 4)):
+            for texture, factor in ((None, 1), ({"index": 0}, 0.5029)):
+                d = Document()
+                base = {"metallicFactor": 0, "baseColorFactor": [0.5, 1, 1, 1]} | ({"baseColorTexture": texture} if texture else {})
+                mesh = d.square({"pbrMetallicRoughness": base}, [0, 0, 1, 0, 1, 1, 0, 1])
+                plain = d.square({"pbrMetallicRoughness": base}, [0, 0, 1, 0, 1, 1, 0, 1])
+                d.json["meshes"][plain]["primitives"][0]["material"] = 0  # the same material without colours stays as it is
+                d.json["images"], d.json["textures"] = [{"uri": "grey.png"}], [{"source": 0}]
+                accessor = d.accessor(values, "VEC3" if letters == "f" else "VEC4", letters)
+                d.json["accessors"][accessor]["normalized"] = letters == "H"
+                d.json["meshes"][mesh]["primitives"][0]["attributes"]["COLOR_0"] = accessor
+                d.node(mesh=mesh, scale=[0.5, 1, 1], translation=[-0.5, 0, 0])
+                d.node(mesh=plain, scale=[0.5, 1, 1], translation=[0.5, 0, 0])
+                d.camera()
+                image, _ = self.render(d.write(self.folder / "a.gltf"), layers="albedo", size="4x4")
+                left, right = ([image[f"albedo.{c}"][i] for c in "RGB"] for i in (4, 7))
+                for found, wanted in zip(left + right, [0.1, 0.4, 0.8, 0.5, 1, 1]):
+                    # Albedo has a dielectric's gloss on top: 4 % of what is left.
+                    self.assertAlmostEqual(found, wanted * factor, delta=0.05)
+
     def test_a_file_without_camera_and_light_is_framed_under_a_sky(self):
         d = Document()
         d.node(mesh=d.square(), translation=[1000, 50, -20], rotation=[-0.70710678, 0, 0, 0.70710678], scale=[30, 30, 1])

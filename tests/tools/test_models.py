@@ -188,6 +188,17 @@ class Models(cli.Cli):
         os.mkfifo(self.folder / "pipe.fbx")
         self.assert_ends(lumicut("render", self.folder / "pipe.fbx", "-o", self.folder / "x.exr"), BAD_FILE, "pipe.fbx")
 
+    def test_colours_of_vertices_of_a_ply_are_its_colour(self):
+        text = ply(FLOOR).replace("property float z\n", "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n")
+        head, body = text.split("end_header\n")
+        lines = body.splitlines()
+        path = self.write("red.ply", head + "end_header\n" + "\n".join([f"{line} 188 55 0" for line in lines[:4]] + lines[4:]) + "\n")
+        out = self.folder / "x.exr"
+        self.assert_ends(lumicut("render", path, "-o", out, "--size", "9x9", "--layers", "albedo", "--vpls", 10), OK)
+        image = oiio.ImageInput.open(str(out)).read_image("float")
+        for found, wanted in zip(image[4, 4, -3:], (0.503, 0.038, 0)):  # of sRGB 188 and 55
+            self.assertAlmostEqual(found, wanted, delta=2e-3)
+
     def test_a_texture_that_is_missing_is_warned_of(self):
         self.write("a.mtl", "newmtl a\nKd 1 1 1\nmap_Kd none.png\n")
         _, said = self.render(self.write("a.obj", "mtllib a.mtl\nusemtl a\n" + obj(FLOOR)))
