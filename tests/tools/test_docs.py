@@ -137,7 +137,8 @@ class Docs(unittest.TestCase):
         self.assertGreater(seen, 30)
 
     def test_names_of_the_c_abi_are_in_its_headers(self):
-        headers = "".join(p.read_text() for p in (ROOT / "plugin/include/lumicut").iterdir())
+        headers = "".join(p.read_text() for folder in ("plugin/include/lumicut", "geometry/c_api/include/lumicut")
+                          for p in (ROOT / folder).iterdir())
         known = set(re.findall(r"\b(?:lumicut|LUMICUT)_\w+", headers))
         # Upper case also names variables of the environment and options of the build.
         for top in {p.name for p in ROOT.iterdir()} - {"build", "out", "docs", "README.md", ".git"}:
