@@ -29,7 +29,8 @@ enum class Stage : uint32_t {
   octree_shift,
   compensation,
   path,
-  nearby_lights
+  nearby_lights,
+  importance
 };
 
 // PCG32 (XSH-RR). [O'Neill 2014]

@@ -22,6 +22,7 @@ struct CommonParams {
   VirtualLights virtual_lights = VirtualLights::points;
   float sphere_scale = 1.0f;  // of the distance to the tenth nearest
   bool compensate = false;
+  bool importance = false;
   bool operator==(const CommonParams&) const = default;
 };
 

@@ -59,9 +59,20 @@ std::optional<EmitterShape> LightSampler::shape(size_t i) const {
   return s;
 }
 
-double LightSampler::cell(size_t i, const EmitterShape& s, uint64_t count) const {
-  const double lights = static_cast<double>(count) * power_.sum(extended_ + i, extended_ + i + 1) /
-                        power_.sum(extended_, sampler_.size());
+std::optional<Vec3f> LightSampler::place_of(size_t emitter) const {
+  const Emitter& e = sampler_[emitter];
+  if (e.kind == Kind::sun || e.kind == Kind::environment) return {};
+  if (e.kind == Kind::triangle) {
+    const EmitterShape s = *shape(emitter - extended_);
+    return s.corner + (s.u + s.v) / 3.0f;
+  }
+  return scene_.lights()[e.index].position;
+}
+
+double LightSampler::cell(size_t i, const EmitterShape& s, uint64_t count, const DiscreteDistribution* chances) const {
+  const double lights = chances != nullptr ? static_cast<double>(count) * chances->pmf(i)
+                                           : static_cast<double>(count) * power_.sum(extended_ + i, extended_ + i + 1) /
+                                                 power_.sum(extended_, sampler_.size());
   return static_cast<double>(s.area) * (s.both_sides ? 2.0 : 1.0) / lights;
 }
 

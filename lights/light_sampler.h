@@ -23,6 +23,7 @@ struct EmittedRay {
   Vec3f origin, direction;  // unit
   Rgb flux{};               // W that the path carries, already divided by its probability
   uint32_t group = 0;
+  uint32_t emitter = 0;  // as LightSampler counts all
 };
 
 // A virtual light that stands for emitters that are not points.
@@ -64,15 +65,16 @@ class LightSampler {
   // `count` VPLs stands for. `s`: of shape(i), here and below.
   size_t extended_count() const { return sampler_.size() - extended_; }
   std::optional<EmitterShape> shape(size_t i) const;
-  double cell(size_t i, const EmitterShape& s, uint64_t count) const;
+  double cell(size_t i, const EmitterShape& s, uint64_t count, const DiscreteDistribution* chances = nullptr) const;
   // The place `at` on its surface as a virtual light, seen from `from`, that stands for the area `area`; ends of shadow
   // rays stand off it by `offset`.
   Vpl place_on(size_t i, const EmitterShape& s, const Vec3f& at, const Vec3f& from, float area, float& offset) const;
   // Their numbers: of a light, of a triangle in an instance of its mesh. Empty where it is none.
   std::optional<size_t> emitter_of_light(uint32_t light) const;
   std::optional<size_t> emitter_of_triangle(uint32_t mesh, uint32_t triangle, uint32_t instance) const;
-  // One of `count` VPLs that stand for these emitters' direct light; `u` in [0,1) chooses the emitter by power.
-  Vpl sample_direct(double u, uint64_t count, Rng& rng) const;
+  // One of `count` VPLs that stand for these emitters' direct light; `u` in [0,1) chooses the emitter by power, or by
+  // other chances: of each of these emitters, here and in cell().
+  Vpl sample_direct(double u, uint64_t count, Rng& rng, const DiscreteDistribution* chances = nullptr) const;
   // True where some mesh emits.
   bool has_meshes() const { return has_meshes_; }
   bool has_environment() const { return environment_share_ > 0.0; }
@@ -81,7 +83,15 @@ class LightSampler {
   // VPL i of `count` that stand for the environment: stratified over its importance (a Hammersley set, jittered,
   // through the map's row and column distributions).
   Vpl environment_light(uint64_t i, uint64_t count, uint64_t seed) const;
-  EmittedRay sample_ray(Rng& rng) const;
+  // `chances`: of all emitters, in place of their power.
+  EmittedRay sample_ray(Rng& rng, const DiscreteDistribution* chances = nullptr) const;
+  // All emitters, of which those with extent are the last: their number, a place within each (empty where it is
+  // infinitely far), and chances by power.
+  size_t emitter_count() const { return sampler_.size(); }
+  std::optional<Vec3f> place_of(size_t emitter) const;
+  double power_of(size_t emitter) const { return power_.sum(emitter, emitter + 1); }
+  // One of those with extent as a virtual light, by chance.
+  DirectSample sample_extended(size_t i, Rng& rng) const;
   // One VPL that stands for the direct light of environment and extended emitters, where there are any.
   DirectSample sample_light(Rng& rng) const;
   // Whether rays that leave a point that lights are sampled at may find extended emitter i. Spheres and suns are not there

@@ -136,16 +136,24 @@ Vec3f LightSampler::sample_sun(const Light& light, Rng& rng) const {
   return Frame(light.direction).to_world(uniform_cone(std::cos(light.radius), at.x, at.y));
 }
 
-Vpl LightSampler::sample_direct(double u, uint64_t count, Rng& rng) const {
+Vpl LightSampler::sample_direct(double u, uint64_t count, Rng& rng, const DiscreteDistribution* chances) const {
   double rest;
-  const size_t i = power_.sample(u, extended_, sampler_.size(), rest);
+  const size_t i =
+      chances != nullptr ? extended_ + chances->sample(u) : power_.sample(u, extended_, sampler_.size(), rest);
   const Emitter& e = sampler_[i];
   const auto weight =
-      static_cast<float>(power_.sum(extended_, sampler_.size()) / (power_.sum(i, i + 1) * static_cast<double>(count)));
+      static_cast<float>(chances != nullptr ? 1.0 / (chances->pmf(i - extended_) * static_cast<double>(count))
+                                            : power_.sum(extended_, sampler_.size()) /
+                                                  (power_.sum(i, i + 1) * static_cast<double>(count)));
   ExtendedSample s = extended_light(e, weight, rng);
   s.vpl.offset = s.offset;
   if (s.area_pdf > 0.0f) s.vpl.cell = weight / s.area_pdf;
   return s.vpl;
+}
+
+DirectSample LightSampler::sample_extended(size_t i, Rng& rng) const {
+  const ExtendedSample s = extended_light(sampler_[extended_ + i], 1.0f, rng);
+  return {s.vpl, found_by_rays(i), s.offset, s.area_pdf};
 }
 
 // Light of a rectangle or disk whose spread is narrowed.
@@ -221,10 +229,11 @@ EmittedRay LightSampler::distant_ray(const Vec3f& travel, const Rgb& irradiance,
   return {through - travel * behind, travel, irradiance * static_cast<float>(1.0 / density), 0};
 }
 
-EmittedRay LightSampler::sample_ray(Rng& rng) const {
-  const size_t i = power_.sample((static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32);
+EmittedRay LightSampler::sample_ray(Rng& rng, const DiscreteDistribution* chances) const {
+  const DiscreteDistribution& choice = chances != nullptr ? *chances : power_;
+  const size_t i = choice.sample((static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32);
   const Emitter& e = sampler_[i];
-  const auto weight = static_cast<float>(1.0 / power_.pmf(i));
+  const auto weight = static_cast<float>(1.0 / choice.pmf(i));
   EmittedRay ray;
   switch (e.kind) {
     case Kind::point: {
@@ -288,7 +297,7 @@ EmittedRay LightSampler::sample_ray(Rng& rng) const {
       break;
     }
   }
-  ray.flux = ray.flux * weight;
+  ray.flux = ray.flux * weight, ray.emitter = static_cast<uint32_t>(i);
   return ray;
 }
 

@@ -88,7 +88,7 @@ double solid_angle_of(const EmitterShape& s, const Vec3f& from) {
 }  // namespace
 
 NearLights::NearLights(const LightSampler& sampler, uint64_t lights, double clamp_lights, float distance,
-                       const Progress& progress)
+                       const Progress& progress, const DiscreteDistribution* chances)
     : sampler_(sampler) {
   if (lights == 0 || !(clamp_lights > 0.0 || distance > 0.0f)) return;
   const size_t count = sampler.extended_count();
@@ -99,7 +99,7 @@ NearLights::NearLights(const LightSampler& sampler, uint64_t lights, double clam
     const auto shape = sampler.shape(i);
     if (!shape) continue;
     boxes[i] = shape->bounds();
-    const double cell = sampler.cell(i, *shape, lights);
+    const double cell = sampler.cell(i, *shape, lights, chances);
     reach2[i] = distance > 0.0f ? distance * distance : static_cast<float>(clamp_lights * cell * std::numbers::inv_pi);
     power[i] = static_cast<float>(static_cast<double>(shape->area) / cell);
     if (reach2[i] > 0.0f && power[i] > 0.0f) order_.push_back(static_cast<uint32_t>(i));

@@ -17,7 +17,7 @@ class NearLights {
   // them lie within the clamp distance of each; `distance`, above 0: the same for all instead. The sampler outlives this.
   // Throws Error(cancelled).
   NearLights(const LightSampler& sampler, uint64_t lights, double clamp_lights, float distance,
-             const Progress& progress);
+             const Progress& progress, const DiscreteDistribution* chances = nullptr);
   // No light reaches anywhere: nothing is to be sampled.
   bool empty() const { return nodes_.empty(); }
   // Whether any light may be near.

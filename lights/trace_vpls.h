@@ -9,6 +9,7 @@
 
 namespace lumicut {
 
+class CameraImportance;
 class LightSampler;
 
 struct VplOptions {
@@ -29,7 +30,9 @@ struct VplOptions {
 
 // Energy is normalised by the number of light paths. Deterministic. A scene without emitters gives no lights.
 VplSet trace_vpls(const Scene& scene, const VplOptions& options, Progress& progress);
-VplSet trace_vpls(const Scene& scene, const LightSampler& emitters, const VplOptions& options, Progress& progress);
+// `importance`: lights are where the camera feels them, by chance and weighted for it; null: by power alone.
+VplSet trace_vpls(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
+                  const CameraImportance* importance, Progress& progress);
 
 // The same lights with oriented ones and spheres moved off their surface by their offset, so that shadow rays can start
 // there. Traced lights and a host's own lie on their surfaces; those whose offset is not known have the one of the

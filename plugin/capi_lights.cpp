@@ -52,6 +52,11 @@ lumicut_result get_set(lumicut_integrator integrator, lumicut_vpl_set* lights) {
   return guard([&] {
     object(integrator);
     if (lights == nullptr) fail_argument("lumicut_vpl_set: is NULL");
+    // What another render would take them for: samples of emitters by power.
+    if (const Prepared* p = object(integrator).prepared.get(); p != nullptr && p->importance != nullptr)
+      fail_argument(
+          "parameter importance: these virtual lights were put where one camera sees them, and their origins tell "
+          "nothing of its chances; lumicut_integrator_get_lights gives them without");
     write(lights, prepared(integrator, "lumicut_lights_extension.get").view());
   });
 }

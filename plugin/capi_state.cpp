@@ -44,9 +44,18 @@ std::string state_key(const lumicut_integrator_t& i, const Params& params, const
   return key.text();
 }
 
+// A state serves all cameras.
+void require_lights_for_all(const Params& params) {
+  if (params.common().importance)
+    fail_argument(
+        "parameter importance: it puts virtual lights where one camera sees them, and a saved state serves all "
+        "cameras");
+}
+
 std::vector<uint8_t> save(lumicut_integrator_t& i) {
   if (i.prepared == nullptr) fail_state("lumicut_integrator: nothing is prepared, so nothing can be saved");
   const Prepared& p = *i.prepared;
+  require_lights_for_all(*p.params);
   lumicut_scene_t& s = i.prepared_scene();
   const AccessGuard::Hold reading = s.gate.read("lumicut_state_extension.save");
   if (s.changed || p.scene_version != s.scene.version())
@@ -81,6 +90,7 @@ std::vector<uint8_t> save(lumicut_integrator_t& i) {
 
 void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uint64_t size, Progress& progress,
           Stats& stats) {
+  require_lights_for_all(i.params);
   Header h;
   if (size < sizeof(h)) fail_bytes(number_text(size) + " bytes are too few");
   std::memcpy(&h, bytes, sizeof(h));

@@ -30,6 +30,10 @@ lumicut_render_t::lumicut_render_t(lumicut_integrator_t& integrator, lumicut_sce
   if (integrator.host_lights != nullptr && integrator.params.common().compensate)
     fail_argument(
         "parameter compensate: only lights that the library traced can be compensated, and the host set its own");
+  if (integrator.host_lights != nullptr && integrator.params.common().importance)
+    fail_argument(
+        "parameter importance: it puts lights that the library traces where the camera sees them, and the host set its "
+        "own");
   if (iterations.groups && integrator.entry.light_source == LightSource::emitters)
     fail_argument(std::string("lumicut_render_desc.flags: ") + integrator.entry.id +
                   " has no virtual lights, so LUMICUT_GROUPS means nothing to it");

@@ -65,7 +65,7 @@ std::vector<GroupMethod> RenderLoop::methods(const Prepared& prepared, std::vect
 void RenderLoop::run(Progress& progress, Stats& stats, const std::function<void(const Rect&)>& tile_done) {
   progress.check();
   if (progressive_) return render_iterations(progress, stats, tile_done);
-  preparation_.prepare(scene_, scene_owner_, preparation_.params, progress, stats);
+  preparation_.prepare(scene_, scene_owner_, preparation_.params, progress, stats, whole_frame());
   const Prepared& prepared = *preparation_.prepared;
   {
     const PhaseTimer timer(stats, "render");
@@ -104,7 +104,7 @@ void RenderLoop::render_iterations(Progress& progress, Stats& stats,
   };
   const auto prepare = [&](uint32_t iteration) {
     preparation_.prepare(scene_, scene_owner_, params_of_iteration(preparation_.params, iteration, scene_), progress,
-                         stats);
+                         stats, whole_frame());
   };
   if (!iterations_.resume.empty()) {
     done = load_checkpoint(iterations_.resume, key, mean, film_);

@@ -55,6 +55,7 @@ class RenderLoop {
     std::unique_ptr<Integrator> method;
   };
   void render_iterations(Progress& progress, Stats& stats, const std::function<void(const Rect&)>& tile_done);
+  FrameSize whole_frame() const { return {options_.width, options_.height}; }
   FrameOptions frame_options(const Prepared& prepared) const;
   FrameLight frame_light(const Prepared& prepared) const;
   std::vector<GroupMethod> methods(const Prepared& prepared, std::vector<OfGroup>& of_groups, Progress& progress,

@@ -164,6 +164,21 @@ TEST(Passes, OnlyTracedLightsAreCompensated) {
   EXPECT_NE(std::string(lumicut_last_error()).find("compensate"), std::string::npos);
 }
 
+TEST(Passes, ImportanceIsRefusedWithTheHostsLights) {
+  const api::Device device(1);
+  const api::Scene s = scene(device);
+  const api::Integrator i = integrator(device, 60);
+  ASSERT_EQ(lumicut_integrator_set(i.get(), "importance", "true"), LUMICUT_OK);
+  lumicut_vpl light{};
+  light.position[2] = 0.5f;
+  light.intensity[0] = light.intensity[1] = light.intensity[2] = 1;
+  ASSERT_EQ(lumicut_integrator_set_lights(i.get(), &light, 1), LUMICUT_OK);
+  lumicut_render render = nullptr;
+  const auto f = frame(8, 8);
+  EXPECT_EQ(lumicut_render_start(i.get(), s.get(), &f, &render), LUMICUT_INVALID_ARGUMENT);
+  EXPECT_NE(std::string(lumicut_last_error()).find("importance"), std::string::npos);
+}
+
 TEST(Passes, ACheckpointIsShownOnlyWhereItIsKept) {
   const api::Device device(1);
   const api::Scene s = scene(device);

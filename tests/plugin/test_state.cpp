@@ -2,6 +2,7 @@
 #include <cstring>
 
 #include "box_scene.h"
+#include "lumicut/lumicut_lights.h"
 #include "lumicut/lumicut_state.h"
 
 namespace {
@@ -55,6 +56,27 @@ TEST(State, LoadedStateRendersTheSameImageWithoutAnyPreparation) {
   EXPECT_EQ(r.read("radiance"), image);
   EXPECT_EQ(save(second), bytes);
   EXPECT_EQ(second.lights().size(), first.lights().size());
+}
+
+// A state serves all cameras, and its lights would be for one.
+TEST(State, IsRefusedWithImportance) {
+  const api::Device device(2);
+  const api::Scene s = scene(device);
+  api::Integrator i = integrator(device, 500, "wspd");
+  render(i, s);
+  const auto bytes = save(i);
+  ASSERT_EQ(lumicut_integrator_set(i.get(), "importance", "true"), LUMICUT_OK);
+  EXPECT_EQ(load(i, s, bytes), LUMICUT_INVALID_ARGUMENT);
+  EXPECT_NE(std::string(lumicut_last_error()).find("importance"), std::string::npos);
+  render(i, s);
+  uint64_t size = 0;
+  EXPECT_EQ(extension().save(i.get(), nullptr, &size), LUMICUT_INVALID_ARGUMENT);
+  // Nor do origins tell with which chances such lights were drawn.
+  const auto& lights = *static_cast<const lumicut_lights_extension*>(lumicut_get_extension(LUMICUT_LIGHTS_EXTENSION));
+  lumicut_vpl_set set{};
+  set.struct_size = sizeof(set);
+  EXPECT_EQ(lights.get(i.get(), &set), LUMICUT_INVALID_ARGUMENT);
+  EXPECT_GT(i.lights().size(), 0u);
 }
 
 TEST(State, OfSpheresRendersTheSameImage) {

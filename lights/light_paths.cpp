@@ -1,0 +1,117 @@
+#include "lights/light_paths.h"
+
+#include "bsdf/straight_glass.h"
+#include "core/parallel.h"
+#include "scene/scene.h"
+
+namespace lumicut {
+
+namespace {
+
+constexpr size_t kPathsPerChunk = 1024;
+
+struct LightPath {
+  Vec3f origin, direction;
+  Rgb flux{};
+  uint32_t group = 0;
+  uint32_t emitter = 0;
+  Rng rng;
+  uint32_t met = 0;  // surfaces
+  Rgb absorption{};  // on its way, for each unit of length
+  // RayKind: the first ray meets what stops samples of its light, and what is seen.
+  uint32_t kind = kDiffuseRay | kShadowRay;
+};
+
+// Follows paths [first, last) in step, so that rays are traced in batches.
+std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
+                                 const CameraImportance* importance, uint64_t first, uint64_t last) {
+  const DiscreteDistribution* starts = importance != nullptr ? &importance->path_starts() : nullptr;
+  BallQueryTree::Scratch scratch;
+  std::vector<PathVpl> vpls;
+  std::vector<LightPath> paths;
+  std::vector<uint64_t> ids;
+  for (uint64_t i = first; i < last; ++i) {
+    Rng rng(options.seed, Stage::light_path, i);
+    const EmittedRay e = emitters.sample_ray(rng, starts);
+    if (!(max_component(e.flux) > 0.0f)) continue;
+    paths.push_back({e.origin, e.direction, e.flux, e.group, e.emitter, rng});
+    ids.push_back(i);
+  }
+  std::vector<RayHit> rays;
+  for (uint32_t step = 0; step < options.max_depth + kMostStraight && !paths.empty(); ++step) {
+    rays.assign(paths.size(), {});
+    for (size_t i = 0; i < paths.size(); ++i)
+      rays[i].ray.org = paths[i].origin, rays[i].ray.dir = paths[i].direction, rays[i].ray.mask = paths[i].kind;
+    scene.accel().intersect(rays);
+    size_t alive = 0;
+    for (size_t i = 0; i < paths.size(); ++i) {
+      if (rays[i].hit.geom == kNoId) continue;
+      LightPath path = paths[i];
+      const uint32_t seen_by = scene.meshes()[rays[i].hit.geom].mask;
+      if ((seen_by & kDiffuseRay) == 0) continue;  // it stops the light, and nobody sees it
+      const SurfaceInteraction at = scene.interaction(rays[i]);
+      path.flux *= at.bsdf.transmittance_to(at.t, path.absorption);
+      if ((path.kind & ~seen_by & kShadowRay) != 0) {
+        // Lit, and no shadow behind it: half of the paths stay, half go on.
+        path.flux = path.flux * 2.0f;
+        if (path.rng.next_float() < 0.5f) {
+          path.origin = at.bsdf.origin(kTransmitted);
+          paths[alive] = path, ids[alive++] = ids[i];
+          continue;
+        }
+      }
+      Vpl light;
+      light.position = at.position, light.kind = VplKind::oriented, light.normal = at.bsdf.normal();
+      light.offset = at.offset;
+      light.group = path.group;
+      const auto leave = [&](const Rgb& intensity) {
+        if (!(max_component(intensity) > 0.0f) || !is_finite(intensity)) return;
+        light.intensity = intensity;
+        if (importance != nullptr) {
+          const float keep = importance->keep(light.position, light.normal, scratch);
+          if (!(path.rng.next_float() < keep)) return;
+          light.intensity *= 1.0f / keep;
+        }
+        vpls.push_back({ids[i], path.emitter, light});
+      };
+      leave(at.bsdf.lambertian_intensity(path.flux));
+      light.normal = -light.normal;
+      leave(at.bsdf.passed_intensity(path.flux));
+      const auto next = at.bsdf.scatter(path.rng);
+      if (!next) continue;
+      if ((next->flags & kStraight) == 0 && ++path.met >= options.max_depth) continue;
+      if ((next->flags & kStraight) == 0) path.kind = kDiffuseRay;
+      path.absorption = at.bsdf.absorption_after(next->flags, path.absorption);
+      path.origin = at.bsdf.origin(next->flags), path.direction = next->direction;
+      path.flux = path.flux * next->weight * next->factor;
+      if (!(max_component(path.flux) > 0.0f) || !is_finite(path.flux)) continue;
+      paths[alive] = path;
+      ids[alive++] = ids[i];
+    }
+    paths.erase(paths.begin() + static_cast<ptrdiff_t>(alive), paths.end());
+    ids.resize(alive);
+  }
+  std::stable_sort(vpls.begin(), vpls.end(), [](const PathVpl& a, const PathVpl& b) { return a.path < b.path; });
+  return vpls;
+}
+
+}  // namespace
+
+std::vector<PathVpl> trace_light_paths(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
+                                       const CameraImportance* importance, uint64_t first, uint64_t last,
+                                       Progress& progress) {
+  const size_t chunks = (last - first + kPathsPerChunk - 1) / kPathsPerChunk;
+  std::vector<std::vector<PathVpl>> parts(chunks);
+  tbb::parallel_for(size_t{0}, chunks, [&](size_t c) {
+    if (progress.cancelled()) return;
+    parts[c] = trace_paths(scene, emitters, options, importance, first + c * kPathsPerChunk,
+                           std::min(last, first + (c + 1) * kPathsPerChunk));
+    progress.advance(parts[c].size());
+  });
+  progress.check();
+  std::vector<PathVpl> all;
+  for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+}  // namespace lumicut
