@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Panels of view layers, objects, worlds, materials, lights and cameras, and those that are borrowed from Blender."""
 import bpy
-from bl_ui.properties_material import panel_node_draw
 
-from . import passes
+from . import compat, passes
 from .panels import ENGINE, Panel, split, wrapped
 
 # Blender's own panels that fit: their sets of engines are theirs alone, unlike those of Cycles' panels.
@@ -166,11 +165,11 @@ class MaterialOutput(Panel):
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and context.material.use_nodes and not context.material.grease_pencil
+        return super().poll(context) and compat.has_nodes(context.material) and not context.material.grease_pencil
 
     def draw(self, context):
         wrapped(self.layout, self.hint, context, "INFO")
-        panel_node_draw(split(self.layout), context.material.node_tree, "OUTPUT_MATERIAL", self.bl_label)
+        compat.panel_node_draw(split(self.layout), context.material.node_tree, "OUTPUT_MATERIAL", self.bl_label)
 
 
 class LUMICUT_PT_material_volume(MaterialOutput, bpy.types.Panel):
@@ -232,13 +231,13 @@ class LUMICUT_PT_light(Panel, bpy.types.Panel):
 class LUMICUT_PT_light_nodes(Panel, bpy.types.Panel):
     bl_label = "Nodes"
     bl_context = "data"
-    bl_options = {"DEFAULT_CLOSED"}
     owner = "light"
 
     def draw(self, context):
         layout, light = split(self.layout), context.light
-        layout.prop(light, "use_nodes", icon="NODETREE")
-        if light.use_nodes:
+        if compat.shows_nodes_switch(light):
+            layout.prop(light, "use_nodes", icon="NODETREE")
+        if compat.has_nodes(light):
             output = light.node_tree.get_output_node("ALL") or light.node_tree.get_output_node("CYCLES")
             if output is not None:
                 layout.template_node_view(light.node_tree, output, output.inputs["Surface"])

@@ -6,7 +6,7 @@ import os
 import bpy
 import numpy as np
 
-from . import ies
+from . import compat, ies
 from .lumicut import library
 from .directions import Directions
 from .nodes import Value
@@ -50,7 +50,7 @@ class LampReader(Directions):
 
 def emission_of(light, images, report):
     """Colour times strength of a lamp's own nodes, 1 where it has none; and its IES texture, (node, rotation) or None."""
-    if not light.use_nodes or light.node_tree is None:
+    if not compat.has_nodes(light):
         return np.ones(3), None
     reader = LampReader(light.name, images, report)
     output = light.node_tree.get_output_node("CYCLES") or light.node_tree.get_output_node("ALL")

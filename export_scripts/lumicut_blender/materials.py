@@ -10,7 +10,7 @@ import math
 import bpy
 import numpy as np
 
-from . import volumes
+from . import compat, volumes
 from .lumicut import library
 from .images import Images, Picture, image_of
 from .mappings import Mapping, aligned
@@ -744,7 +744,7 @@ class Materials:
     def _surface(self, material, name, ray):
         if material is None:
             return Surface(diffuse=Value(0.8)), None, None
-        if not material.use_nodes or material.node_tree is None:
+        if not compat.has_nodes(material):
             return Surface(diffuse=Value(list(material.diffuse_color)[:3])), None, None
         reader = SurfaceReader(name, self.images, self.report)
         reader.ray, reader.aspect, reader.material_index = ray, self.aspect, material.pass_index

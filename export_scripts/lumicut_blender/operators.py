@@ -7,7 +7,7 @@ from bl_operators.presets import AddPresetBase
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from . import engine, properties, runtime
+from . import compat, engine, properties, runtime
 
 ENGINE = "LUMICUT"
 PRESETS_FOLDER = "lumicut/sampling"  # of the user's, below scripts/presets
@@ -39,12 +39,11 @@ class LUMICUT_OT_sampling_preset_add(AddPresetBase, bpy.types.Operator):
     bl_label = "Add Sampling Preset"
     preset_menu = "LUMICUT_PT_sampling_presets"
     preset_subdir = PRESETS_FOLDER
-    preset_defines = ["settings = bpy.context.scene.lumicut"]
 
     @property
     def preset_values(self):
         values = properties.saved_values(bpy.context.scene.lumicut)
-        return [f"settings.{key}" if group is None else f"settings.{group}.{key}" for group, key in values]
+        return [".".join(["bpy.context.scene.lumicut", *(part for part in place if part is not None)]) for place in values]
 
 
 def users_of(name):
@@ -109,16 +108,11 @@ class LUMICUT_OT_wire_denoiser(bpy.types.Operator):
     bl_label = "Denoise in the Compositor"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context):
-        return hasattr(context.scene, "node_tree")
-
     def execute(self, context):
         scene, layer = context.scene, context.view_layer
         layer.lumicut.use_pass_denoising = True
-        scene.use_nodes = True
+        tree = compat.make_compositor_tree(scene)
         layer.update_render_passes()
-        tree = scene.node_tree
         source = next((n for n in tree.nodes if n.type == "R_LAYERS" and n.scene in {None, scene} and n.layer == layer.name), None)
         if source is None:
             source = tree.nodes.new("CompositorNodeRLayers")
@@ -135,8 +129,7 @@ class LUMICUT_OT_wire_denoiser(bpy.types.Operator):
             node.prefilter = "NONE"  # the guides are free of noise
         targets = [link.to_socket for link in source.outputs["Image"].links]
         if not targets:
-            composite = next((n for n in tree.nodes if n.type == "COMPOSITE"), None) or tree.nodes.new("CompositorNodeComposite")
-            targets = [composite.inputs["Image"]]
+            targets = [compat.compositor_image_input(tree)]
         for target in targets:
             tree.links.new(node.outputs["Image"], target)
         for name, socket in (("Noisy Image", "Image"), ("Denoising Normal", "Normal"), ("Denoising Albedo", "Albedo")):

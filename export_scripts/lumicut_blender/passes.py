@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Passes of a view layer: which it asks for, what the library's channels give of them, what is left out or refused."""
-import bpy
 import numpy as np
 
-from . import properties, shadow_catcher
+from . import compat, properties, shadow_catcher
 from .lumicut import library
 
-FLAT_RECTS = bpy.app.version >= (4, 1, 0)
 NO_DEPTH = 1e10  # as Cycles has it where nothing is hit
 
 # Properties of view layers, and of what Cycles adds to them, for passes that are not there: shown by their names.
@@ -27,7 +25,7 @@ LEFT_OUT = {
 def write_pass(render_pass, pixels):
     """pixels (h, w, channels), top row first, into a pass that counts rows from the bottom."""
     pixels = np.ascontiguousarray(pixels[::-1], np.float32)
-    render_pass.rect.foreach_set(pixels.reshape(-1) if FLAT_RECTS else pixels.reshape(-1, pixels.shape[2]))
+    render_pass.rect.foreach_set(pixels.reshape(-1) if compat.FLAT_RECTS else pixels.reshape(-1, pixels.shape[2]))
 
 
 def of_cycles(owner, name, otherwise):
@@ -85,7 +83,7 @@ def note_left_out(layer, report):
 
 def of_compositor(scene, layer_name):
     """Names of the layer's passes that the scene's compositor makes its image or files from."""
-    tree = getattr(scene, "compositing_node_group", None) or (scene.node_tree if getattr(scene, "use_nodes", False) else None)
+    tree = compat.compositor_tree(scene)
     if tree is None or not scene.render.use_compositing:
         return set()
     found, seen = set(), set()

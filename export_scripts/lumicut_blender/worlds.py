@@ -2,7 +2,7 @@
 """The world: what lights, its suns, and what the camera alone sees in its place."""
 import numpy as np
 
-from . import sky
+from . import compat, sky
 from .lumicut import library
 from .directions import Directions
 from .images import Picture
@@ -90,7 +90,7 @@ def convert_world(world, materials, report, bake=None):
 
 def _read_world(world, materials, report, camera=False):
     """(radiance, rotation of its image, whether the camera sees another) as the nodes say, where they can be followed."""
-    if not world.use_nodes or world.node_tree is None:
+    if not compat.has_nodes(world):
         return Value([max(0.0, float(c)) for c in world.color]), np.eye(3), False
     reader = WorldReader(world.name, materials.images, report)
     reader.of_camera = camera

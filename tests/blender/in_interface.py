@@ -9,7 +9,7 @@ import addon_utils
 import bpy
 
 import helpers as h
-from lumicut_blender import data_panels, migration, operators, panels, properties, report, runtime
+from lumicut_blender import compat, data_panels, migration, operators, panels, passes, properties, report, runtime
 
 ENGINE = panels.ENGINE
 
@@ -322,3 +322,49 @@ class Notes(unittest.TestCase):
             h.set_lumicut(vpls=100)
             h.render()
         self.assertIn((report.APPROXIMATED, "Shaders taken as diffuse", ["Toon (Toon BSDF)"]), runtime.last["entries"])
+
+
+class OtherVersions(unittest.TestCase):
+    """What Blender 5 has otherwise, by stand-ins that have what its release notes say."""
+
+    def test_nodes_without_a_switch_are_followed(self):
+        tree = object()
+        self.assertTrue(compat.has_nodes(types.SimpleNamespace(node_tree=tree)))
+        self.assertFalse(compat.has_nodes(types.SimpleNamespace(node_tree=tree, use_nodes=False)))
+        self.assertFalse(compat.has_nodes(types.SimpleNamespace(node_tree=None, use_nodes=True)))
+
+    def test_the_compositor_is_a_group_of_its_own(self):
+        class Thing:
+            def __init__(self, kind="", **more):
+                self.type, self.mute, self.inputs, self.outputs = kind, False, [], []
+                self.__dict__.update(more)
+
+        layers = Thing("R_LAYERS", scene=None, layer="ViewLayer")
+        output = Thing("GROUP_OUTPUT")
+        link = types.SimpleNamespace(from_node=layers, from_socket=types.SimpleNamespace(name="Emission"))
+        output.inputs = [types.SimpleNamespace(links=[link])]
+        group = types.SimpleNamespace(nodes=[layers, output])
+        scene = Thing(compositing_node_group=group, render=types.SimpleNamespace(use_compositing=True))
+        self.assertIs(compat.compositor_tree(scene), group)
+        self.assertEqual(passes.of_compositor(scene, "ViewLayer"), {"Emission"})
+        scene.compositing_node_group = None
+        self.assertEqual(passes.of_compositor(scene, "ViewLayer"), set())
+
+    def test_the_image_goes_into_the_groups_output(self):
+        output = types.SimpleNamespace(type="GROUP_OUTPUT", inputs={})
+        made = []
+
+        class Interface:
+            def new_socket(self, name, in_out, socket_type):
+                made.append((name, in_out, socket_type))
+                output.inputs[name] = "the socket"
+
+        tree = types.SimpleNamespace(nodes=[output], interface=Interface())
+        self.assertEqual(compat.compositor_image_input(tree), "the socket")
+        self.assertEqual(compat.compositor_image_input(tree), "the socket")
+        self.assertEqual(made, [("Image", "OUTPUT", "NodeSocketColor")])
+
+    def test_nothing_asks_for_what_is_gone(self):
+        for path in sorted(pathlib.Path(panels.__file__).parent.glob("*.py")):
+            found = re.findall(r"\bbgl\b|\.bindcode|node_tree\.(?:inputs|outputs)|EEVEE_NEXT|(?:scene|layer)\.\w+\[\"|scene\.node_tree", path.read_text())
+            self.assertEqual(found, ["scene.node_tree"] * 2 if path.name == "compat.py" else [], path.name)

@@ -27,6 +27,12 @@ KNOWN = {
 }
 
 
+def shader_nodes():
+    """Classes of shader nodes, by their labels. (Blender 4 makes classes as they are asked for.)"""
+    found = [getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith("ShaderNode")]
+    return sorted((cls for cls in found if issubclass(cls, bpy.types.ShaderNode) and cls is not bpy.types.ShaderNode), key=lambda cls: cls.bl_rna.name)
+
+
 def of_notes(owner):
     """(severity, text) of the notes that name this owner, worst first."""
     return [(severity, text) for severity, text, names in runtime.last["entries"]
@@ -105,7 +111,7 @@ class Page(unittest.TestCase):
         image.pixels.foreach_set(np.random.default_rng(1).random(256).astype(np.float32))
         image.pack()
         cases = []
-        for cls in sorted(bpy.types.ShaderNode.__subclasses__(), key=lambda cls: cls.bl_rna.name):
+        for cls in shader_nodes():
             m = h.material("probe")
             try:
                 probe = m.node_tree.nodes.new(cls.__name__)
@@ -169,7 +175,7 @@ class Page(unittest.TestCase):
     # ---- Shaders ------------------------------------------------------------------------------------------------------
 
     def test_2_every_shader(self):
-        kinds = [cls for cls in sorted(bpy.types.ShaderNode.__subclasses__(), key=lambda cls: cls.bl_rna.name)]
+        kinds = shader_nodes()
         cases = []
         for cls in kinds:
             m = h.material("case")
@@ -269,7 +275,7 @@ class Page(unittest.TestCase):
         def table(head, rows):
             return "\n".join([f"| {head} | Cycles | Lumicut |", "|---|---|---|", *(f"| {a} | {b} | {c} |" for a, b, c in rows)])
 
-        others = sorted((cls.bl_rna.name, NOT_IN_CYCLES[kind]) for cls in bpy.types.ShaderNode.__subclasses__()
+        others = sorted((cls.bl_rna.name, NOT_IN_CYCLES[kind]) for cls in shader_nodes()
                         for kind in [getattr(self.probe(cls), "type", None)] if kind in NOT_IN_CYCLES)
         text = HEAD + "\n\n".join([
             "## Nodes that give values", table("node: outputs", Page.rows["values"]),
@@ -355,9 +361,10 @@ def _(test):
     return replaced("Volume", bpy.data.volumes.new("Volume"))
 
 
-@feature("Objects", "grease pencil", "drawn by Blender")
-def _(test):
-    return replaced("Strokes", bpy.data.grease_pencils.new("Strokes"))
+if bpy.app.version < (4, 3, 0):  # since then Blender ends where it has no GPU to draw them with
+    @feature("Objects", "grease pencil", "drawn by Blender")
+    def _(test):
+        return replaced("Strokes", bpy.data.grease_pencils.new("Strokes"))
 
 
 @feature("Objects", "hair particles")
@@ -535,16 +542,20 @@ def _(test):
     bpy.context.scene.camera.data.type = "ORTHO"
 
 
+def of_lens(camera):
+    return camera if hasattr(camera, "panorama_type") else camera.cycles
+
+
 @feature("Cameras", "panoramic, equirectangular")
 def _(test):
     bpy.context.scene.camera.data.type = "PANO"
-    bpy.context.scene.camera.data.cycles.panorama_type = "EQUIRECTANGULAR"
+    of_lens(bpy.context.scene.camera.data).panorama_type = "EQUIRECTANGULAR"
 
 
 @feature("Cameras", "panoramic, fisheye")
 def _(test):
     bpy.context.scene.camera.data.type = "PANO"
-    bpy.context.scene.camera.data.cycles.panorama_type = "FISHEYE_EQUIDISTANT"
+    of_lens(bpy.context.scene.camera.data).panorama_type = "FISHEYE_EQUIDISTANT"
 
 
 @feature("Cameras", "shift")

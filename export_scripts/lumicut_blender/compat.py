@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where Blender's Python interface differs between versions: 3.4 to 4.3 are tested, of 5.x what its release notes say.
+(Units and shaders that Cycles changed are where they are used: they are measured, not looked up.)"""
+import bpy
+
+try:
+    from bl_ui.properties_material import panel_node_draw
+except ImportError:  # private to Blender's own panels: may move
+    def panel_node_draw(layout, tree, _output_type, input_name):
+        output = tree.get_output_node("ALL")
+        if output is not None and input_name in output.inputs:
+            layout.template_node_view(tree, output, output.inputs[input_name])
+
+FLAT_RECTS = bpy.app.version >= (4, 1, 0)  # pixels of passes are set as one row of numbers
+
+
+def has_nodes(owner):
+    """Whether a material, world or light is described by nodes: always from 5.0 on, where the switch is deprecated."""
+    return bool(getattr(owner, "use_nodes", True)) and getattr(owner, "node_tree", None) is not None
+
+
+def shows_nodes_switch(owner):
+    return hasattr(owner, "use_nodes") and bpy.app.version < (5, 0, 0)
+
+
+def compositor_tree(scene):
+    """The scene's compositor nodes, or None. 5.0 has them in a node group of their own."""
+    if hasattr(scene, "compositing_node_group"):
+        return scene.compositing_node_group
+    return scene.node_tree if getattr(scene, "use_nodes", False) else None
+
+
+def make_compositor_tree(scene):
+    if hasattr(scene, "compositing_node_group"):
+        if scene.compositing_node_group is None:
+            scene.compositing_node_group = bpy.data.node_groups.new("Compositor Nodes", "CompositorNodeTree")
+        return scene.compositing_node_group
+    scene.use_nodes = True
+    return scene.node_tree
+
+
+def compositor_image_input(tree):
+    """The socket that the compositor's image goes into, made where there is none."""
+    output = next((n for n in tree.nodes if n.type in {"COMPOSITE", "GROUP_OUTPUT"}), None)
+    if output is None:
+        if hasattr(bpy.types, "CompositorNodeComposite"):  # gone in 5.0
+            output = tree.nodes.new("CompositorNodeComposite")
+        else:
+            output = tree.nodes.new("NodeGroupOutput")
+    if output.type == "GROUP_OUTPUT" and "Image" not in output.inputs:
+        tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+    return output.inputs["Image"]
