@@ -2,19 +2,22 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <deque>
 #include <iostream>
 #include <memory>
 
 #include "core/error.h"
 #include "geometry/command/commands.h"
+#include "geometry/command/pictures.h"
 #include "geometry/dynamic_hull.h"
 
 namespace lumicut {
 namespace {
 
 struct Arguments {
-  std::string stream = "-";
+  std::string stream = "-", picture;
   size_t window = 0;
+  int size = 1000;
   bool check_simple = false, summary = false;
 };
 
@@ -56,12 +59,21 @@ Point2 point_of(const std::string& line, const std::string& where) {
   return p;
 }
 
+std::string draw(const Arguments& a, const std::deque<Point2>& window, const DynamicHull& hull) {
+  std::vector<Point2> corners;
+  hull.for_each_hull_vertex([&](const Point2& p) { corners.push_back(p); });
+  const std::vector<Point2> chain(window.begin(), window.end());
+  return draw_circles(a.picture.ends_with(".svg"), {}, {}, {}, a.size, chain, corners);
+}
+
 int run(const Arguments& a) {
+  check_output(a.picture);
   std::istringstream file;
   if (a.stream != "-") file = open_text(a.stream);
   std::istream& in = a.stream == "-" ? std::cin : file;
   const std::string name = a.stream == "-" ? "standard input" : a.stream;
   DynamicHull hull({.check_simple = a.check_simple});
+  std::deque<Point2> window;  // of a picture
   Output output{a.summary};
   std::string line;
   size_t number = 0, inserted = 0, deleted = 0;
@@ -79,8 +91,10 @@ int run(const Arguments& a) {
         hull.pop_back();
         ++deleted;
       } else {
-        hull.push_front(point_of(line, where));
+        const Point2 p = point_of(line, where);
+        hull.push_front(p);
         ++inserted;
+        if (!a.picture.empty()) window.push_back(p);
         if (a.window != 0 && hull.size() > a.window) hull.pop_back(), ++deleted;
       }
     } catch (const Error& e) {
@@ -90,6 +104,8 @@ int run(const Arguments& a) {
   }
   if (in.bad()) fail_argument(name + ": cannot be read to its end");
   if (!told) output.hull(hull);
+  while (window.size() > hull.size()) window.pop_front();
+  if (!a.picture.empty()) write_text(a.picture, draw(a, window, hull));
   std::fprintf(stderr, "%zu insertions, %zu deletions, %zu hulls\n", inserted, deleted, output.hulls);
   return 0;
 }
@@ -103,6 +119,8 @@ Command add_hull(CLI::App& app) {
                                      "(deletes the oldest) and ? (tells the hull), a line each");
   command->add_option("stream", a->stream, "File (-: standard input, answered line by line)");
   command->add_option("--window", a->window, "Most points: older ones leave by themselves (0: no limit)");
+  command->add_option("--picture", a->picture, "Picture of the last window and its hull, .svg or .png");
+  command->add_option("--size", a->size, "Its size in pixels")->check(CLI::Range(50, 10000));
   command->add_flag("--summary", a->summary, "Numbers of points and hull vertices alone");
   command->add_flag("--check-simple", a->check_simple,
                     "Refuse a point whose segment crosses the window's chain (slow)");

@@ -5,7 +5,9 @@
 
 #include "core/error.h"
 #include "geometry/command/commands.h"
+#include "geometry/command/pictures.h"
 #include "geometry/csv.h"
+#include "io/atomic_file.h"
 #ifdef LUMICUT_HAS_CGAL
 #include "geometry/epsilon_net.h"
 #endif
@@ -14,7 +16,8 @@ namespace lumicut {
 namespace {
 
 struct Arguments {
-  std::string points, weights, out = "-";
+  std::string points, weights, out = "-", picture;
+  int size = 1000;
   double epsilon = 0.01, c0 = 0;
   uint64_t seed = 0;
   bool thesis = false;
@@ -23,7 +26,8 @@ struct Arguments {
 int run(const Arguments& a) {
 #ifdef LUMICUT_HAS_CGAL
   check_finite("--c0", a.c0);
-  check_output(a.out);
+  check_output(a.out), check_output(a.picture);
+  io::check_distinct({a.out == "-" ? "" : a.out, a.picture});
   auto file = open_text(a.points);
   const auto points = read_points_csv(file, a.points);
   std::vector<double> weights;
@@ -46,6 +50,8 @@ int run(const Arguments& a) {
       n.points.size(), static_cast<double>(n.points.size()) * a.epsilon, n.sample,
       heaviest_unhit_disk(points, weights, n.points), whole);
   write_points(a.out, points, n.points);
+  if (!a.picture.empty())
+    write_text(a.picture, draw_hitting_set(a.picture.ends_with(".svg"), points, {}, n.points, a.size));
   return 0;
 #else
   (void)a;
@@ -66,6 +72,8 @@ Command add_net(CLI::App& app) {
   command->add_option("--c0", a->c0, "Size of the random sample, over epsilon (0: 0.7, with --thesis 7)")
       ->check(CLI::Range(0.0, 1e6));
   command->add_option("--seed", a->seed, "Of the sample");
+  command->add_option("--picture", a->picture, "Picture of points and net, .svg or .png");
+  command->add_option("--size", a->size, "Its size in pixels")->check(CLI::Range(50, 10000));
   command->add_flag("--thesis", a->thesis, "The thesis's construction rather than the certified one");
   return [a] { return run(*a); };
 }

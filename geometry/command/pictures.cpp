@@ -121,7 +121,8 @@ Picture draw_mesh(const FaceMesh& mesh, std::span<const Colour> colours, int wid
 }
 
 std::string draw_circles(bool svg, std::span<const Point2> points, std::span<const Circle> circles,
-                         std::span<const uint32_t> chosen, int size) {
+                         std::span<const uint32_t> chosen, int size, std::span<const Point2> chain,
+                         std::span<const Point2> polygon) {
   Point2 lo{1e300, 1e300}, hi{-1e300, -1e300};
   const auto cover = [&](const Point2& p, double r) {
     lo = {std::min(lo.x, p.x - r), std::min(lo.y, p.y - r)};
@@ -129,7 +130,8 @@ std::string draw_circles(bool svg, std::span<const Point2> points, std::span<con
   };
   for (const Point2& p : points) cover(p, 0);
   for (const Circle& c : circles) cover(c.disk.centre, c.disk.radius);
-  if (points.empty() && circles.empty()) lo = {0, 0}, hi = {1, 1};
+  for (const Point2& p : chain) cover(p, 0);
+  if (points.empty() && circles.empty() && chain.empty()) lo = {0, 0}, hi = {1, 1};
   const double scale = (size - 20) / std::max({hi.x - lo.x, hi.y - lo.y, 1e-300});
   const auto x_of = [&](const Point2& p) { return 10 + (p.x - lo.x) * scale; };
   const auto y_of = [&](const Point2& p) { return size - 10 - (p.y - lo.y) * scale; };
@@ -142,6 +144,13 @@ std::string draw_circles(bool svg, std::span<const Point2> points, std::span<con
       out << "<circle cx=\"" << x_of(d.centre) << "\" cy=\"" << y_of(d.centre) << "\" r=\"" << d.radius * scale
           << "\" fill=\"none\" stroke=\"rgb(" << +c[0] << ',' << +c[1] << ',' << +c[2]
           << ")\" stroke-width=\"0.5\"/>\n";
+    const auto line = [&](const char* element, std::span<const Point2> through, const char* colour) {
+      if (through.empty()) return;
+      out << '<' << element << " fill=\"none\" stroke-linejoin=\"round\" stroke=\"" << colour << "\" points=\"";
+      for (const Point2& p : through) out << x_of(p) << ',' << y_of(p) << ' ';
+      out << "\"/>\n";
+    };
+    line("polyline", chain, "#7a9ec2"), line("polygon", polygon, "#d02020");
     for (const Point2& p : points)
       out << "<circle cx=\"" << x_of(p) << "\" cy=\"" << y_of(p) << "\" r=\"" << dot << "\" fill=\"#909090\"/>\n";
     for (const uint32_t i : chosen)
@@ -158,6 +167,12 @@ std::string draw_circles(bool svg, std::span<const Point2> points, std::span<con
       picture.set(static_cast<int>(x_of(d.centre) + d.radius * scale * std::cos(t)),
                   static_cast<int>(y_of(d.centre) + d.radius * scale * std::sin(t)), c);
     }
+  }
+  for (size_t i = 1; i < chain.size(); ++i)
+    picture.line(x_of(chain[i - 1]), y_of(chain[i - 1]), x_of(chain[i]), y_of(chain[i]), {122, 158, 194});
+  for (size_t i = 0; i < polygon.size(); ++i) {
+    const Point2 &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    picture.line(x_of(a), y_of(a), x_of(b), y_of(b), {208, 32, 32});
   }
   for (const Point2& p : points) picture.dot(x_of(p), y_of(p), dot, {144, 144, 144});
   for (const uint32_t i : chosen) picture.dot(x_of(points[i]), y_of(points[i]), 1.6 * dot, {208, 32, 32});

@@ -37,8 +37,10 @@ struct Circle {
   Colour colour;
 };
 // Circles as outlines, points grey, chosen points red: the bytes of an SVG or of a PNG.
+// `chain`: an open line through points, grey; `polygon`: a closed one, red. Either may be empty.
 std::string draw_circles(bool svg, std::span<const Point2> points, std::span<const Circle> circles,
-                         std::span<const uint32_t> chosen, int size);
+                         std::span<const uint32_t> chosen, int size, std::span<const Point2> chain = {},
+                         std::span<const Point2> polygon = {});
 // The same of an instance: its disks in blue.
 std::string draw_hitting_set(bool svg, std::span<const Point2> points, std::span<const Disk> disks,
                              std::span<const uint32_t> chosen, int size);

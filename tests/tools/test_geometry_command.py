@@ -79,6 +79,11 @@ class GeometryCommand(unittest.TestCase):
         file = self.write("chain.csv", [f"{x},{x * x}" for x in range(50)])
         done = run("hull", file, "--window", 5, "--summary")
         self.assertEqual(done.stdout, "5 points, 5 hull vertices\n")
+        picture = self.folder / "hull.svg"
+        done = run("hull", file, "--window", 5, "--picture", picture)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        chain, corners = (picture.read_text().split(f"<{kind} ")[1].split('points="')[1].split('"')[0].split() for kind in ("polyline", "polygon"))
+        self.assertEqual((len(chain), set(chain)), (5, set(corners)))
 
     def test_hull_says_which_line_is_wrong(self):
         self.refused("hull", "-", text="0,0\n1;1\n", says=["standard input, line 2", "y is missing"])
@@ -167,6 +172,9 @@ class GeometryCommand(unittest.TestCase):
         weights = self.write("w.csv", ["1000" if i == heavy else "1" for i in range(len(points))])
         done = run("net", "--points", p, "--weights", weights, "--epsilon", 0.5)
         self.assertIn(str(heavy), [row.split(",")[0] for row in done.stdout.splitlines()[1:]], "it holds more than half alone")
+        done = run("net", "--points", p, "--epsilon", 0.5, "--picture", self.folder / "net.png")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertTrue((self.folder / "net.png").read_bytes().startswith(b"\x89PNG"))
         sizes = [len(run("net", "--points", p, "--epsilon", 0.2, "--thesis", "--c0", c0).stdout.splitlines()) for c0 in (2, 20)]
         self.assertLess(sizes[0], sizes[1])
         self.refused("net", "--points", p, "--weights", self.write("few.csv", ["1"]), says=["few.csv", "1 weights of 120 points"])
