@@ -13,6 +13,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <functional>
+#include <ostream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -317,6 +318,7 @@ void sweep(const std::function<void()>& life, long tries, bool apart = false) {
 struct Case {
   std::string integrator, accel;
 };
+void PrintTo(const Case& c, std::ostream* out) { *out << c.integrator << " on " << c.accel; }
 std::vector<Case> all_cases() {
   std::vector<Case> all;
   auto info = make<lumicut_integrator_info>();
