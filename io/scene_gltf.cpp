@@ -111,6 +111,8 @@ class Reader {
 
   // ---- Numbers of accessors
 
+  static constexpr size_t kMostWithoutBuffer = size_t{1} << 24;
+
   // `width` numbers an element, integers of normalized accessors as shares of 1.
   std::vector<double> numbers(int index, int width, const std::string& where) const {
     const auto& accessor = at(model_.accessors, index, where);
@@ -119,8 +121,12 @@ class Reader {
       fail(name, fmt::format("has another type than {} numbers an element, which {} needs", width, where));
     if (accessor.sparse.isSparse) fail(name, "is sparse, which is not supported");
     const int bytes = gltf::GetComponentSizeInBytes(static_cast<uint32_t>(accessor.componentType));
-    std::vector<double> out(accessor.count * static_cast<size_t>(width));
-    if (accessor.bufferView < 0 || out.empty()) return out;  // all 0
+    if (accessor.count == 0) return {};
+    if (accessor.bufferView < 0) {  // all 0
+      if (accessor.count > kMostWithoutBuffer)
+        fail(name, fmt::format("has {} elements and no bufferView: more than {}", accessor.count, kMostWithoutBuffer));
+      return std::vector<double>(accessor.count * static_cast<size_t>(width));
+    }
     const auto& view = at(model_.bufferViews, accessor.bufferView, name);
     const auto& buffer = at(model_.buffers, view.buffer, fmt::format("bufferViews[{}]", accessor.bufferView));
     const int stride = accessor.ByteStride(view);
@@ -130,6 +136,7 @@ class Reader {
         (accessor.count - 1) * static_cast<size_t>(stride) + element > buffer.data.size() - start)
       fail(name, fmt::format("its {} elements do not lie in buffers[{}] of {} bytes", accessor.count, view.buffer,
                              buffer.data.size()));
+    std::vector<double> out(accessor.count * static_cast<size_t>(width));
     for (size_t i = 0; i < accessor.count; ++i)
       for (int k = 0; k < width; ++k) {
         const unsigned char* at =
@@ -171,6 +178,11 @@ class Reader {
   static double number_of(const gltf::Value* from, const char* key, double missing) {
     if (from == nullptr || !from->Has(key) || !from->Get(key).IsNumber()) return missing;
     return from->Get(key).GetNumberAsDouble();
+  }
+  // What is no number of an element is one that no list has.
+  static int index_of(const gltf::Value* from, const char* key, int missing) {
+    const double number = number_of(from, key, missing);
+    return std::abs(number) < 2147483647.0 && number == std::floor(number) ? static_cast<int>(number) : 2147483647;
   }
   static Vec vector_of(const gltf::Value* from, const char* key, const Vec& missing) {
     if (from == nullptr || !from->Has(key) || !from->Get(key).IsArray()) return missing;
@@ -320,7 +332,7 @@ class Reader {
       const auto& texture = at(model_.materials, material, where).pbrMetallicRoughness.baseColorTexture;
       set = texture.texCoord;
       transform = extension(texture.extensions, "KHR_texture_transform");
-      set = static_cast<int>(number_of(transform, "texCoord", set));
+      set = index_of(transform, "texCoord", set);
     }
     if (attribute(fmt::format("TEXCOORD_{}", set)) >= 0) {
       const auto uvs = numbers(attribute(fmt::format("TEXCOORD_{}", set)), 2, where + ".TEXCOORD");
@@ -337,6 +349,11 @@ class Reader {
       fail(where, "its attributes have different numbers of elements");
     std::vector<uint32_t> order;
     if (from.indices >= 0) {
+      const int type = at(model_.accessors, from.indices, where + ".indices").componentType;
+      if (type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE && type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT &&
+          type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)
+        fail(fmt::format("accessors[{}]", from.indices),
+             fmt::format("componentType {} is no unsigned integer, as {}.indices are", type, where));
       for (const double i : numbers(from.indices, 1, where + ".indices")) {
         if (!(i < static_cast<double>(vertices))) fail(where, fmt::format("index {} is not below {}", i, vertices));
         order.push_back(static_cast<uint32_t>(i));
@@ -420,7 +437,7 @@ class Reader {
     if (node.mesh >= 0) place(node, world, where);
     if (node.camera >= 0 && !has_camera_) read_camera(node.camera, world, where);
     if (const auto* light = extension(node.extensions, "KHR_lights_punctual"))
-      read_light(static_cast<int>(number_of(light, "light", -1)), world, where);
+      read_light(index_of(light, "light", -1), world, where);
     for (const int child : node.children) read_node(child, world, depth + 1);
   }
   void place(const gltf::Node& node, const Affine& world, const std::string& where) {
@@ -430,7 +447,7 @@ class Reader {
         instancing && instancing->Has("attributes")) {
       const auto& attributes = instancing->Get("attributes");
       const auto read = [&](const char* name, int width) {
-        const auto accessor = static_cast<int>(number_of(&attributes, name, -1));
+        const int accessor = index_of(&attributes, name, -1);
         return accessor < 0 ? std::vector<double>{} : numbers(accessor, width, where + "." + name);
       };
       const auto t = read("TRANSLATION", 3), q = read("ROTATION", 4), s = read("SCALE", 3);

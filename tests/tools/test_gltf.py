@@ -191,6 +191,9 @@ class Gltf(cli.Cli):
             done = lumicut("render", d.write(self.folder / "bad.gltf"), "-o", self.folder / "x.exr", "--size", "8x8")
             self.assert_ends(done, BAD_FILE, "bad.gltf", *texts)
         wrong(lambda d: d.json["accessors"][1].update(count=4000), "accessors[1]", "4000", "buffers[0]")
+        wrong(lambda d: d.json["accessors"][d.json["meshes"][0]["primitives"][0]["indices"]].update(componentType=5126, count=1),
+              "accessors[", "componentType 5126", "indices")
+        wrong(lambda d: d.json["nodes"][0].update(extensions={"KHR_lights_punctual": {"light": 1e300}}), "2147483647")
         wrong(lambda d: d.json["nodes"].__setitem__(0, {"mesh": 7}), "nodes[0]", "7")
         wrong(lambda d: d.json["nodes"][0].update(children=[0]), "nodes[0]", "without end")
         wrong(lambda d: d.json["materials"][0].update(pbrMetallicRoughness={"roughnessFactor": 3}), "materials[0].roughnessFactor", "3")
