@@ -7,7 +7,7 @@
 
 namespace lumicut::io {
 
-// glTF (scene_gltf.h), models (scene_model.h), else JSON (scene_json.h). Throws FileError.
+// glTF, models (FBX ...), pbrt, Mitsuba, else JSON. Throws FileError.
 SceneData read_scene_file(const std::string& path);
 
 }  // namespace lumicut::io

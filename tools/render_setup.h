@@ -21,7 +21,8 @@ class InterruptWatcher;
 
 inline constexpr const char* kUsualIntegrator = "lightcuts";
 
-inline constexpr const char* kSceneHelp = "Scene: JSON, glTF, OBJ, FBX, COLLADA or PLY (docs/formats.md)";
+inline constexpr const char* kSceneHelp =
+    "Scene: JSON, glTF, OBJ, FBX, COLLADA, PLY, pbrt or Mitsuba (docs/formats.md)";
 
 struct RenderSetup {
   std::string integrator, accel = "bvh", builder, rays = "robust";

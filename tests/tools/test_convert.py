@@ -103,7 +103,9 @@ class Convert(cli.Cli):
                                          "v -3 0 3\nv 3 0 3\nv 3 0 -3\nv -3 0 -3\nf 1/1/1 2/2/1 3/3/1 4/4/1\nusemtl b\nf 1 2 4\n"), size),
                              (self.write("d.ply", test_models.ply(test_models.FLOOR, test_models.BOX)), size),
                              (self.write("e.dae", test_models.collada(MESHES)), size), (self.write("f.fbx", test_models.fbx(MESHES)), size),
-                             (ROOT / "reference_images/cornell_box/cornell_box.json", size)):
+                             (ROOT / "reference_images/cornell_box/cornell_box.json", size),
+                             *((ROOT / "tests/tools/scenes" / name, size)
+                               for name in ("cornell.pbrt", "materials.pbrt", "forest.pbrt", "cornell.xml", "table.xml"))):
             with self.subTest(scene.name):
                 self.assert_same_image(scene, *words)
 

@@ -1,0 +1,125 @@
+// What the readers of pbrt's and Mitsuba's scenes share: shapes as meshes, textures as programs, metals, lights of any
+// falloff. Everything in world space, y or z up as the file has it.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "io/affine.h"
+#include "io/scene_data.h"
+#include "io/texture_store.h"
+
+namespace lumicut::io {
+
+inline constexpr double kPi = 3.14159265358979323846;
+inline double radians(double degrees) { return degrees * kPi / 180; }
+
+Affine translation(const Vec& v);
+Affine scaling(const Vec& v);
+Affine rotation(const Vec& axis, double angle);
+// Nothing where there is none.
+std::optional<Affine> inverse(const Affine& m);
+
+// A mesh without its place and material.
+struct Geometry {
+  std::vector<float> positions, normals, uvs;
+  std::vector<uint32_t> indices;
+};
+// Of radius 1 about the origin, its area that of the sphere; u around z, v from -z (0) to z (1).
+Geometry sphere_geometry();
+// Corners -1 to 1 in the plane z = 0, towards z; uv 0 to 1 along x and y.
+Geometry rectangle_geometry();
+// Corners -1 to 1; each face has uv 0 to 1.
+Geometry cube_geometry();
+// In the plane z = `height` about the z axis, towards z, of the disk's area.
+Geometry disk_geometry(double height, double radius, double inner, double sweep);
+// About the z axis, outwards, without lids.
+Geometry cylinder_geometry(double radius, double z0, double z1, double sweep);
+
+// What a material's value is made of: a constant, or what is computed at the hit.
+struct Paint;
+using PaintRef = std::shared_ptr<const Paint>;
+struct Paint {
+  enum class Kind { constant, image, checker, product, mix, invert, power };
+  Kind kind = Kind::constant;
+  Vec value{0, 0, 0};           // constant; power: the exponent in [0]
+  int32_t texture = 0;          // image
+  double uv[4] = {1, 1, 0, 0};  // image, checker: scale and offset of u, v
+  PaintRef a, b, share;         // checker, product, mix: a where share is 0
+};
+PaintRef constant_paint(const Vec& value);
+PaintRef constant_paint(double value);
+PaintRef power_paint(PaintRef base, double exponent);
+// What it is without the place; nothing where it depends on that.
+std::optional<Vec> constant_of(const PaintRef& paint);
+
+// A metal of complex index of refraction, as base colour and tint at 82 degrees of the library's GGX.
+struct Metal {
+  Vec colour, tint;
+};
+Metal metal_of(const Vec& eta, const Vec& k);
+// eta and k of "Cu", "Au", "Ag", "Al" and the like in red, green and blue.
+std::optional<std::pair<Vec, Vec>> named_metal(const std::string& name);
+// Linear Rec.709 of a black body, of luminance 1.
+Vec blackbody(double kelvin);
+// Of power by wavelength in nm, linear between. A flat spectrum of 1 is what `flat` says: CIE's integral, or 1 for Y.
+Vec rgb_of_spectrum(const std::vector<std::pair<double, double>>& spectrum);
+
+class SceneBuilder {
+ public:
+  explicit SceneBuilder(std::string path) : path_(std::move(path)), textures_(scene.textures) {}
+
+  SceneData scene;
+
+  [[noreturn]] void fail(const std::string& where, const std::string& text) const;
+  void leave_out(const std::string& what);    // once each
+  void approximate(const std::string& what);  // once each
+
+  // Image of that name beside the scene's file. 0, with a warning, where it is missing.
+  int32_t image(const std::string& name, TextureUse use, uint32_t flags);
+  TextureStore& textures() { return textures_; }
+  const std::string& path() const { return path_; }
+
+  // A colour of a material: factor and texture. Values are cut to [0, most].
+  void set_colour(const PaintRef& paint, float* factor, int32_t& texture, double most = 1);
+  void set_number(const PaintRef& paint, float& factor, int32_t& texture);
+  // Of the emission (a colour), and of an opacity.
+  int32_t colour_texture(const PaintRef& paint) { return texture_of(decoded(paint, true)); }
+  int32_t number_texture(const PaintRef& paint);
+
+  uint32_t add_material(const std::string& name, const lumicut_material& values);
+  // The material with another emission.
+  uint32_t with_emission(uint32_t material, const Vec& radiance, int32_t texture, bool both_sides);
+
+  // `flipped`: what the winding says is the back. The same shape and material are stored once (`key`; "": alone).
+  void add(const std::string& name, const Geometry& geometry, const Affine& place, uint32_t material, bool flipped,
+           const std::string& key = "");
+  // Meshes of a file, of any format that has no materials of its own or whose materials do not count.
+  std::vector<Geometry> read_meshes(const std::string& name);
+
+  void add_light(const lumicut_light& light, const std::string& name);
+  // Lights of falloff by the angle to `direction`: linear between (radians, W/sr).
+  void add_profile_light(const Vec& position, const Vec& direction, const Vec& colour, std::vector<float> angles,
+                         std::vector<float> values, const std::string& name);
+  // What is not there is put in its place.
+  SceneData finish(bool has_camera);
+
+ private:
+  int32_t compile(const PaintRef& paint, Program& program);
+  int32_t texture_of(const PaintRef& paint);
+  PaintRef decoded(const PaintRef& paint, bool colour) const;
+
+  std::string path_;
+  TextureStore textures_;
+  std::map<std::string, size_t> shared_;
+  std::set<std::string> told_;
+  std::map<const Paint*, std::pair<PaintRef, int32_t>> painted_;
+};
+
+}  // namespace lumicut::io

@@ -1,0 +1,759 @@
+#include "io/scene_mitsuba.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <list>
+#include <map>
+#include <memory>
+#include <optional>
+#include <pugixml.hpp>
+#include <set>
+
+#include "io/file_error.h"
+#include "io/find_beside.h"
+#include "io/scene_builder.h"
+#include "io/scene_defaults.h"
+#include "io/text_lines.h"
+
+namespace lumicut::io {
+
+namespace {
+
+using Node = pugi::xml_node;
+
+constexpr int kDeepest = 64;                        // of elements and files inside of each other
+constexpr uint64_t kMostBytes = uint64_t{1} << 30;  // of one file
+constexpr size_t kMostFiles = 1000;
+
+class Reader {
+ public:
+  explicit Reader(const std::string& path) : build_(path) {}
+
+  SceneData read() {
+    build_.scene.width = 768, build_.scene.height = 576;
+    grey_ = build_.add_material("no bsdf", default_material());
+    read_file(build_.path());
+    return build_.finish(has_camera_);
+  }
+
+ private:
+  [[noreturn]] void fail(const Node& node, const std::string& text) const {
+    std::string where = fmt::format("<{}", node.name());
+    for (const char* key : {"type", "name", "id"})
+      if (node.attribute(key)) where += fmt::format(" {}=\"{}\"", key, shown(node.attribute(key).value()));
+    build_.fail(where + ">", text);
+  }
+
+  // ---- Files
+
+  void read_file(const std::string& path) {
+    if (++depth_ > kDeepest || documents_.size() >= kMostFiles)
+      throw FileError(path, "files include each other without end");
+    check_regular_file(path);
+    const std::string text = read_whole_file(path, kMostBytes);
+    documents_.emplace_back();
+    const auto result = documents_.back().load_buffer(text.data(), text.size());
+    if (!result) throw FileError(path, fmt::format("byte {}: {}", result.offset, result.description()));
+    const Node root = documents_.back().document_element();
+    if (std::string(root.name()) != "scene")
+      throw FileError(path, fmt::format("its first element is <{}>, not <scene>", shown(root.name())));
+    for (const Node& child : root.children()) element(child);
+    --depth_;
+  }
+
+  void element(const Node& node) {
+    const std::string name = node.name();
+    if (node.type() != pugi::node_element) return;
+    if (name == "default") {
+      defaults_.emplace(text(node, "name"), text(node, "value"));
+    } else if (name == "include") {
+      const std::string file = text(node, "filename");
+      const FoundFile found = find_beside(build_.path(), file);
+      if (found.path.empty()) fail(node, fmt::format("the file {} does not exist", shown(file)));
+      read_file(found.path);
+    } else if (name == "alias") {
+      const auto known = ids_.find(text(node, "id"));
+      if (known == ids_.end()) fail(node, "there is no such id");
+      ids_[text(node, "as")] = known->second;
+    } else if (name == "integrator" || name == "sampler" || name == "path") {
+      if (name == "path") build_.leave_out("<path>: files are searched for beside the scene");
+    } else if (name == "medium") {
+      build_.leave_out("media");
+    } else if (name == "bsdf" || name == "texture" || name == "spectrum") {
+      remember(node);
+    } else if (name == "emitter") {
+      remember(node);
+      emitter(node);
+    } else if (name == "sensor") {
+      sensor(node);
+    } else if (name == "shape") {
+      remember(node);
+      if (text(node, "type") != "shapegroup") shape(node, {}, {});
+    } else {
+      build_.leave_out(fmt::format("<{}>", name));
+    }
+  }
+  void remember(const Node& node) {
+    if (node.attribute("id")) ids_[text(node, "id")] = node;
+  }
+
+  // ---- Values
+
+  // An attribute, with $NAME replaced by what <default> says.
+  std::string text(const Node& node, const char* key) const {
+    std::string value = node.attribute(key).value();
+    size_t begin = 0;
+    for (int times = 0; times < 100 && (begin = value.find('$', begin)) != std::string::npos; ++times) {
+      size_t end = begin + 1;
+      while (end < value.size() && (std::isalnum(static_cast<unsigned char>(value[end])) || value[end] == '_')) ++end;
+      const auto known = defaults_.find(value.substr(begin + 1, end - begin - 1));
+      if (known == defaults_.end())
+        fail(node, fmt::format("${} has no <default>", shown(value.substr(begin + 1, end - begin - 1))));
+      if (known->second.size() > 10000) fail(node, "a <default> is too long");
+      value.replace(begin, end - begin, known->second);
+      begin += known->second.size();
+    }
+    return value;
+  }
+  std::vector<double> numbers(const Node& node, const std::string& from) const {
+    std::vector<double> out;
+    for (size_t at = 0; at < from.size();) {
+      if (from[at] == ' ' || from[at] == ',' || from[at] == '\t' || from[at] == '\n' || from[at] == '\r') {
+        ++at;
+        continue;
+      }
+      if (from[at] == '+') ++at;
+      double value = 0;
+      const auto [end, error] = std::from_chars(from.data() + at, from.data() + from.size(), value);
+      if (error != std::errc() || !std::isfinite(value))
+        fail(node, fmt::format("\"{}\" is no finite number", shown(from.substr(at))));
+      out.push_back(value);
+      at = static_cast<size_t>(end - from.data());
+    }
+    return out;
+  }
+  double number_in(const Node& node, const char* key, double otherwise) const {
+    if (!node.attribute(key)) return otherwise;
+    const auto list = numbers(node, text(node, key));
+    if (list.size() != 1) fail(node, fmt::format("\"{}\" is {} numbers, not one", key, list.size()));
+    return list[0];
+  }
+  // The child that is called so; references are followed.
+  Node child(const Node& node, const std::string& name) const {
+    for (const Node& c : node.children())
+      if (c.attribute("name") && text(c, "name") == name) return std::string(c.name()) == "ref" ? referred(c) : c;
+    return {};
+  }
+  Node referred(const Node& ref) const {
+    const auto known = ids_.find(text(ref, "id"));
+    if (known == ids_.end()) fail(ref, "there is no such id above it");
+    return known->second;
+  }
+  double number(const Node& node, const char* name, double otherwise) const {
+    const Node c = child(node, name);
+    return c && c.attribute("value") && std::string(c.name()) != "texture" ? number_in(c, "value", otherwise)
+                                                                           : otherwise;
+  }
+  std::string word(const Node& node, const char* name, const std::string& otherwise) const {
+    const Node c = child(node, name);
+    return c ? text(c, "value") : otherwise;
+  }
+  bool truth(const Node& node, const char* name, bool otherwise) const {
+    return word(node, name, otherwise ? "true" : "false") == "true";
+  }
+  Vec vector_of(const Node& node, const Vec& otherwise) const {
+    if (!node) return otherwise;
+    if (node.attribute("value")) {
+      const auto list = numbers(node, text(node, "value"));
+      if (list.size() == 1) return {list[0], list[0], list[0]};
+      if (list.size() != 3) fail(node, fmt::format("has {} numbers instead of 3", list.size()));
+      return {list[0], list[1], list[2]};
+    }
+    return {number_in(node, "x", otherwise[0]), number_in(node, "y", otherwise[1]), number_in(node, "z", otherwise[2])};
+  }
+  Vec point_at(const Node& node, const char* key) const {
+    const auto list = numbers(node, text(node, key));
+    if (list.size() != 3) fail(node, fmt::format("\"{}\" has {} numbers instead of 3", key, list.size()));
+    return {list[0], list[1], list[2]};
+  }
+
+  // Steps are applied in their order.
+  Affine transform(const Node& node) const {
+    Affine out;
+    for (const Node& step : node.children()) {
+      if (step.type() != pugi::node_element) continue;
+      const std::string kind = step.name();
+      Affine m;
+      if (kind == "translate") {
+        m = translation(vector_of(step, {0, 0, 0}));
+      } else if (kind == "scale") {
+        m = scaling(vector_of(step, {1, 1, 1}));
+      } else if (kind == "rotate") {
+        const Vec axis = vector_of(step, {0, 0, 0});
+        if (!(length(axis) > 0)) fail(step, "turns about no axis");
+        m = rotation(axis, radians(number_in(step, "angle", 0)));
+      } else if (kind == "matrix") {
+        const auto list = numbers(step, text(step, "value"));
+        if (list.size() == 16) {
+          if (list[12] != 0 || list[13] != 0 || list[14] != 0 || list[15] != 1) fail(step, "is not affine");
+          std::copy_n(list.begin(), 12, m.m.begin());
+        } else if (list.size() == 9) {
+          for (size_t r = 0; r < 3; ++r)
+            for (size_t c = 0; c < 3; ++c) m.m[4 * r + c] = list[3 * r + c];
+        } else {
+          fail(step, fmt::format("has {} numbers instead of 16 or 9", list.size()));
+        }
+      } else if (kind == "lookat") {
+        const Vec eye = point_at(step, "origin"), at = point_at(step, "target");
+        const Vec up = step.attribute("up") ? point_at(step, "up") : Vec{0, 1, 0};
+        if (!(length(at - eye) > 0)) fail(step, "looks at its own place");
+        const Vec z = unit(at - eye);
+        Vec x = cross(unit(up), z);
+        if (!(length(x) > 1e-9)) fail(step, "looks along its own up");
+        x = unit(x);
+        const Vec y = cross(z, x);
+        for (size_t r = 0; r < 3; ++r)
+          m.m[4 * r] = x[r], m.m[4 * r + 1] = y[r], m.m[4 * r + 2] = z[r], m.m[4 * r + 3] = eye[r];
+      } else {
+        fail(step, "is no step of a transform");
+      }
+      out = m * out;
+    }
+    return out;
+  }
+  Affine place_of(const Node& node) const {
+    const Node c = child(node, "to_world");
+    return c ? transform(c) : Affine{};
+  }
+
+  // ---- Colours
+
+  Vec colour(const Node& node, bool light) {
+    const std::string kind = node.name();
+    const std::string value = text(node, "value");
+    if (kind == "rgb" && value.starts_with('#')) {
+      if (value.size() != 7) fail(node, "is no colour of six digits");
+      Vec out;
+      for (size_t k = 0; k < 3; ++k) {
+        int byte = 0;
+        const auto [end, error] = std::from_chars(&value[1 + 2 * k], &value[3 + 2 * k], byte, 16);
+        if (error != std::errc() || end != &value[3 + 2 * k]) fail(node, "is no colour of six digits");
+        const double c = byte / 255.0;
+        out[k] = c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+      }
+      return out;
+    }
+    if (kind == "spectrum" && value.find(':') != std::string::npos) {
+      std::string plain = value;
+      std::replace(plain.begin(), plain.end(), ':', ' ');
+      const auto list = numbers(node, plain);
+      std::vector<std::pair<double, double>> spectrum;
+      for (size_t i = 0; i + 1 < list.size(); i += 2) spectrum.emplace_back(list[i], list[i + 1]);
+      std::sort(spectrum.begin(), spectrum.end());
+      Vec rgb = rgb_of_spectrum(spectrum);
+      if (light) return rgb;
+      const Vec flat = rgb_of_spectrum({{300, 1}, {900, 1}});
+      for (size_t k = 0; k < 3; ++k) rgb[k] /= flat[k];
+      return rgb;
+    }
+    if (kind == "spectrum" && node.attribute("type")) {
+      if (text(node, "type") == "blackbody") {
+        build_.approximate("black bodies have a luminance of 1");
+        return blackbody(std::clamp(number(node, "temperature", 5000), 100.0, 1e6));
+      }
+      if (text(node, "type") == "d65" || text(node, "type") == "uniform") {
+        const double scale = number(node, text(node, "type") == "d65" ? "scale" : "value", 1);
+        return {scale, scale, scale};
+      }
+      build_.approximate(fmt::format("spectra of the kind {} are grey", text(node, "type")));
+      return {0.5, 0.5, 0.5};
+    }
+    if (kind == "spectrum" && !node.attribute("value")) {
+      build_.approximate("spectra of files are grey");
+      return {0.5, 0.5, 0.5};
+    }
+    const auto list = numbers(node, value);
+    if (list.size() == 1) return {list[0], list[0], list[0]};
+    if (list.size() != 3) fail(node, fmt::format("has {} numbers instead of 3", list.size()));
+    return {list[0], list[1], list[2]};
+  }
+  // v counts from the top there.
+  PaintRef paint(const Node& node, const char* name, const Vec& otherwise, bool numbers_alone = false) {
+    const Node c = child(node, name);
+    return c ? paint_of(c, numbers_alone) : constant_paint(otherwise);
+  }
+  PaintRef paint(const Node& node, const char* name, double otherwise, bool numbers_alone = false) {
+    return paint(node, name, Vec{otherwise, otherwise, otherwise}, numbers_alone);
+  }
+  PaintRef paint_of(const Node& node, bool numbers_alone) {
+    if (std::string(node.name()) != "texture") return constant_paint(colour(node, false));
+    const auto key = std::pair(node.hash_value(), numbers_alone);
+    const auto known = paints_.find(key);
+    if (known != paints_.end()) return known->second;
+    if (++depth_ > kDeepest) fail(node, "textures lie in each other without end");
+    auto out = std::make_shared<Paint>();
+    PaintRef result = out;
+    const std::string kind = text(node, "type");
+    if (const Node to_uv = child(node, "to_uv")) {
+      const Affine m = transform(to_uv);
+      if (m.m[1] != 0 || m.m[4] != 0) build_.approximate("turned textures are not turned");
+      // In coordinates whose v counts from below.
+      out->uv[0] = m.m[0], out->uv[1] = m.m[5], out->uv[2] = m.m[3], out->uv[3] = 1 - m.m[5] - m.m[7];
+    }
+    if (kind == "bitmap") {
+      const std::string wrap = word(node, "wrap_mode", "repeat");
+      uint32_t flags = wrap == "clamp" ? uint32_t{LUMICUT_CLAMP} : 0u;
+      if (wrap == "mirror") build_.approximate("mirrored textures repeat");
+      if (word(node, "filter_type", "bilinear") == "nearest") flags |= LUMICUT_NEAREST;
+      const bool raw = numbers_alone || truth(node, "raw", false);
+      out->kind = Paint::Kind::image;
+      out->texture = build_.image(word(node, "filename", ""), raw ? TextureUse::numbers : TextureUse::colour, flags);
+      if (out->texture == 0) result = constant_paint(0.5);
+    } else if (kind == "checkerboard") {
+      out->kind = Paint::Kind::checker;
+      out->a = paint(node, "color0", 0.4), out->b = paint(node, "color1", 0.2);
+      // Two squares a unit; the first lies where u and v are 0, which is above.
+      for (double& x : out->uv) x *= 2;
+    } else {
+      build_.approximate(fmt::format("textures of the kind {} are grey", kind));
+      result = constant_paint(0.5);
+    }
+    --depth_;
+    return paints_[key] = result;
+  }
+  // ---- Materials
+
+  double index(const Node& node, const char* name, const std::string& otherwise) const {
+    static const std::map<std::string, double> kNamed = {
+        {"vacuum", 1.0},      {"helium", 1.000036},        {"hydrogen", 1.000132},
+        {"air", 1.000277},    {"carbon dioxide", 1.00045}, {"water", 1.333},
+        {"acetone", 1.36},    {"ethanol", 1.361},          {"carbon tetrachloride", 1.461},
+        {"glycerol", 1.4729}, {"benzene", 1.501},          {"silicone oil", 1.52045},
+        {"bromine", 1.661},   {"water ice", 1.31},         {"fused quartz", 1.458},
+        {"pyrex", 1.47},      {"acrylic glass", 1.49},     {"polypropylene", 1.49},
+        {"bk7", 1.5046},      {"sodium chloride", 1.544},  {"amber", 1.55},
+        {"pet", 1.575},       {"diamond", 2.419}};
+    const Node c = child(node, name);
+    if (c && std::string(c.name()) == "float") return number_in(c, "value", 1.5);
+    const auto found = kNamed.find(c ? text(c, "value") : otherwise);
+    if (found == kNamed.end())
+      fail(c ? c : node,
+           fmt::format("{}: \"{}\" is no material that is known", name, shown(c ? text(c, "value") : otherwise)));
+    return found->second;
+  }
+  float relative_index(const Node& node, const std::string& inside) const {
+    return static_cast<float>(std::clamp(index(node, "int_ior", inside) / index(node, "ext_ior", "air"), 0.1, 10.0));
+  }
+  // GGX's alpha is the square of the library's roughness.
+  void set_alpha(const Node& node, lumicut_material& m, double usual) {
+    if (word(node, "distribution", "beckmann") != "ggx") build_.approximate("Beckmann's distribution is taken as GGX");
+    const char* name = "alpha";
+    if (child(node, "alpha_u")) {
+      name = "alpha_u";
+      build_.approximate("roughness that differs along u and v is taken as that along u");
+    }
+    build_.set_number(power_paint(paint(node, name, usual, true), 0.5), m.roughness, m.roughness_texture);
+  }
+
+  uint32_t bsdf(const Node& node) {
+    const auto known = materials_.find(node.hash_value());
+    if (known != materials_.end()) return known->second;
+    if (++depth_ > kDeepest) fail(node, "bsdfs lie in each other without end");
+    const uint32_t number = make_bsdf(node);
+    --depth_;
+    return materials_[node.hash_value()] = number;
+  }
+  // The bsdf inside of another; the first, or where there are several the `which`th.
+  Node inner(const Node& node, int which = 0) const {
+    for (const Node& c : node.children()) {
+      const std::string name = c.name();
+      const Node found = name == "ref" ? referred(c) : c;
+      if (std::string(found.name()) == "bsdf" && which-- == 0) return found;
+    }
+    return {};
+  }
+
+  uint32_t make_bsdf(const Node& node) {
+    const std::string kind = text(node, "type");
+    const std::string name = node.attribute("id") ? text(node, "id") : kind;
+    if (kind == "twosided") {
+      const Node c = inner(node);
+      return c ? bsdf(c) : grey_;
+    }
+    if (kind == "mask" || kind == "bumpmap" || kind == "normalmap" || kind == "blendbsdf")
+      return wrapped(node, kind, name);
+    lumicut_material m = default_material();
+    m.flags = LUMICUT_GGX;
+    m.roughness = 0;
+    for (float& c : m.specular) c = 1;
+    for (float& c : m.diffuse) c = 1;
+    const auto unread = [&](const char* key) {
+      if (const Node c = child(node, key); c && constant_of(paint_of(c, false)).value_or(Vec{0, 0, 0}) != Vec{1, 1, 1})
+        build_.leave_out(fmt::format("{} of {}", key, kind));
+    };
+    if (kind == "diffuse") {
+      m = default_material();
+      build_.set_colour(paint(node, "reflectance", 0.5), m.diffuse, m.diffuse_texture);
+    } else if (kind == "plastic" || kind == "roughplastic") {
+      build_.set_colour(paint(node, "diffuse_reflectance", 0.5), m.diffuse, m.diffuse_texture);
+      m.ior = relative_index(node, "polypropylene");
+      if (const Node c = child(node, "specular_reflectance"))
+        if (const auto value = constant_of(paint_of(c, false)))
+          for (size_t k = 0; k < 3; ++k) m.specular[k] = static_cast<float>(std::clamp((*value)[k], 0.0, 1.0));
+      if (kind == "roughplastic") set_alpha(node, m, 0.1);
+    } else if (kind == "dielectric" || kind == "roughdielectric" || kind == "thindielectric") {
+      m.transmission = 1;
+      m.ior = relative_index(node, "bk7");
+      if (kind == "roughdielectric") set_alpha(node, m, 0.1);
+      if (kind == "thindielectric") m.flags |= LUMICUT_SHADOWS_PASS;
+      unread("specular_reflectance"), unread("specular_transmittance");
+    } else if (kind == "conductor" || kind == "roughconductor") {
+      m.metallic = 1;
+      conductor(node, m);
+      if (kind == "roughconductor") set_alpha(node, m, 0.1);
+    } else if (kind == "principled" || kind == "principledthin") {
+      build_.set_colour(paint(node, "base_color", 0.5), m.diffuse, m.diffuse_texture);
+      build_.set_number(paint(node, "roughness", 0.5, true), m.roughness, m.roughness_texture);
+      build_.set_number(paint(node, "metallic", 0.0, true), m.metallic, m.metallic_texture);
+      if (child(node, "specular")) {
+        const double root = std::sqrt(0.08 * std::clamp(number(node, "specular", 0.5), 0.0, 1.0));
+        m.ior = static_cast<float>((1 + root) / (1 - root));
+      } else {
+        m.ior = static_cast<float>(std::clamp(number(node, "eta", 1.5), 0.1, 10.0));
+      }
+      m.transmission = static_cast<float>(std::clamp(number(node, "spec_trans", 0), 0.0, 1.0));
+      m.coat = static_cast<float>(std::clamp(number(node, "clearcoat", 0) / 4, 0.0, 1.0));
+      // Its alpha is .1 without gloss, .001 with all of it.
+      m.coat_roughness =
+          static_cast<float>(std::sqrt(0.1 + (0.001 - 0.1) * std::clamp(number(node, "clearcoat_gloss", 0), 0.0, 1.0)));
+      m.flags |= LUMICUT_BURLEY;
+      for (const char* key : {"anisotropic", "sheen", "sheen_tint", "flatness", "spec_tint", "diff_trans"})
+        if (number(node, key, 0) > 0) build_.leave_out(fmt::format("{} of {}", key, kind));
+    } else if (kind == "null") {
+      m = default_material();
+      m.opacity = kHole;
+    } else {
+      build_.approximate(fmt::format("bsdfs of the kind {} are diffuse", kind));
+      m = default_material();
+    }
+    return build_.add_material(name, m);
+  }
+
+  void conductor(const Node& node, lumicut_material& m) {
+    const std::string material = word(node, "material", child(node, "eta") ? "" : "Cu");
+    if (material == "none") {
+      build_.set_colour(paint(node, "specular_reflectance", 1.0), m.diffuse, m.diffuse_texture);
+      return;
+    }
+    std::pair<Vec, Vec> both = *named_metal("Cu");
+    if (!material.empty()) {
+      if (const auto known = named_metal(material))
+        both = *known;
+      else
+        build_.approximate(fmt::format("the metal {} is copper", material));
+    }
+    if (const Node c = child(node, "eta")) both.first = colour(c, true);
+    if (const Node c = child(node, "k")) both.second = colour(c, true);
+    const Metal metal = metal_of(both.first, both.second);
+    const Vec tint = constant_of(paint(node, "specular_reflectance", 1.0)).value_or(Vec{1, 1, 1});
+    for (size_t k = 0; k < 3; ++k) {
+      m.diffuse[k] = static_cast<float>(std::clamp(metal.colour[k] * tint[k], 0.0, 1.0));
+      m.specular_tint[k] = static_cast<float>(metal.tint[k]);
+    }
+  }
+
+  uint32_t wrapped(const Node& node, const std::string& kind, const std::string& name) {
+    const Node c = inner(node);
+    if (!c) fail(node, "holds no bsdf");
+    const uint32_t of = bsdf(c);
+    lumicut_material m = build_.scene.materials[of].values;
+    if (kind == "mask") {
+      const PaintRef opacity = paint(node, "opacity", 0.5, true);
+      if (const auto value = constant_of(opacity))
+        m.opacity = std::max(kHole, static_cast<float>(std::clamp((*value)[0], 0.0, 1.0)));
+      else
+        m.opacity_texture = build_.number_texture(opacity);
+    } else if (kind == "normalmap") {
+      const Node map = texture_in(node);
+      if (map) m.normal_texture = build_.image(word(map, "filename", ""), TextureUse::vectors, 0);
+    } else if (kind == "bumpmap") {
+      const Node map = texture_in(node);
+      if (map) m.height_texture = build_.image(word(map, "filename", ""), TextureUse::numbers, 0);
+      m.bump_distance = static_cast<float>(std::clamp(number(node, "scale", 1), -1e6, 1e6));
+    } else {
+      const double weight = constant_of(paint(node, "weight", 0.5, true)).value_or(Vec{0.5, 0.5, 0.5})[0];
+      build_.approximate("a blend of bsdfs is the one that it has more of");
+      const Node second = inner(node, 1);
+      return weight > 0.5 && second ? bsdf(second) : of;
+    }
+    return build_.add_material(name, m);
+  }
+  Node texture_in(const Node& node) const {
+    for (const Node& c : node.children()) {
+      const Node found = std::string(c.name()) == "ref" ? referred(c) : c;
+      if (std::string(found.name()) == "texture") return found;
+    }
+    return {};
+  }
+
+  // ---- Shapes
+
+  struct Part {
+    std::vector<Geometry> geometry;
+    Affine place;
+    uint32_t material;
+    bool flipped;
+    std::string name;
+  };
+
+  // v counts from the top there, from below here.
+  static Geometry upside_down(Geometry g) {
+    for (size_t i = 1; i < g.uvs.size(); i += 2) g.uvs[i] = 1 - g.uvs[i];
+    return g;
+  }
+
+  // `group`: where the parts of a shapegroup go.
+  void shape(const Node& node, const std::string& group, const std::optional<Affine>& above) {
+    if (++depth_ > kDeepest) fail(node, "shapes lie in each other without end");
+    const std::string kind = text(node, "type");
+    Affine place = place_of(node);
+    if (above) place = *above * place;
+    std::string key;
+    std::vector<Geometry> all;
+    const bool flipped = truth(node, "flip_normals", false);
+    if (kind == "instance") {
+      instance(node, place);
+      --depth_;
+      return;
+    }
+    if (kind == "merge") {
+      for (const Node& c : node.children("shape")) shape(c, group, above);
+      --depth_;
+      return;
+    }
+    if (kind == "sphere") {
+      if (!sphere_) sphere_ = sphere_geometry();
+      const double radius = number(node, "radius", 1);
+      if (!(radius > 0)) fail(node, fmt::format("its radius is {}", radius));
+      place = place * translation(vector_of(child(node, "center"), {0, 0, 0})) * scaling({radius, radius, radius});
+      all.push_back(*sphere_), key = "sphere";
+    } else if (kind == "rectangle") {
+      all.push_back(upside_down(rectangle_geometry())), key = kind;
+    } else if (kind == "cube") {
+      all.push_back(upside_down(cube_geometry())), key = kind;
+    } else if (kind == "disk") {
+      all.push_back(disk_geometry(0, 1, 0, 2 * kPi)), key = kind;
+      // u goes from the middle outwards, v around.
+      for (size_t i = 0; i + 1 < all[0].uvs.size(); i += 2) {
+        const float around = all[0].uvs[i];
+        all[0].uvs[i] = 1 - all[0].uvs[i + 1], all[0].uvs[i + 1] = 1 - around;
+      }
+    } else if (kind == "cylinder") {
+      const Vec p0 = vector_of(child(node, "p0"), {0, 0, 0}), p1 = vector_of(child(node, "p1"), {0, 0, 1});
+      const Vec z = unit(p1 - p0), x = unit(cross(std::abs(z[0]) > 0.9 ? Vec{0, 1, 0} : Vec{1, 0, 0}, z)),
+                y = cross(z, x);
+      Affine stand = translation(p0);
+      for (size_t r = 0; r < 3; ++r) stand.m[4 * r] = x[r], stand.m[4 * r + 1] = y[r], stand.m[4 * r + 2] = z[r];
+      place = place * stand;
+      all.push_back(upside_down(cylinder_geometry(number(node, "radius", 1), 0, length(p1 - p0), 2 * kPi)));
+    } else if (kind == "obj" || kind == "ply") {
+      all = build_.read_meshes(word(node, "filename", ""));
+      const bool turn = truth(node, "flip_tex_coords", kind == "obj") != (kind == "obj");
+      for (Geometry& g : all) {
+        if (truth(node, "face_normals", false)) g.normals.clear();
+        if (turn != (kind == "ply")) g = upside_down(std::move(g));
+      }
+    } else {
+      build_.leave_out(fmt::format("shapes of the kind {}", kind));
+      --depth_;
+      return;
+    }
+    uint32_t material = grey_;
+    if (const Node c = inner(node)) material = bsdf(c);
+    for (const Node& c : node.children())
+      if (std::string(c.name()) == "emitter") {
+        if (text(c, "type") != "area") fail(c, "a shape emits as \"area\" alone");
+        if (!group.empty()) {
+          build_.leave_out("emitters inside of shape groups");
+          continue;
+        }
+        const Node radiance = child(c, "radiance");
+        if (radiance && std::string(radiance.name()) == "texture") {
+          material = build_.with_emission(material, {1, 1, 1}, build_.colour_texture(paint_of(radiance, false)), false);
+        } else {
+          material = build_.with_emission(material, radiance ? colour(radiance, true) : Vec{1, 1, 1}, 0, false);
+        }
+        key.clear();
+      }
+    const std::string name = node.attribute("id") ? text(node, "id") : fmt::format("shape \"{}\"", kind);
+    if (group.empty()) {
+      for (const Geometry& g : all) build_.add(name, g, place, material, flipped, key);
+    } else {
+      groups_[group].push_back({std::move(all), place, material, flipped, name});
+    }
+    --depth_;
+  }
+  void instance(const Node& node, const Affine& place) {
+    for (const Node& c : node.children()) {
+      const Node found = std::string(c.name()) == "ref" ? referred(c) : c;
+      if (std::string(found.name()) != "shape") continue;
+      if (text(found, "type") != "shapegroup") fail(node, "is of no shapegroup");
+      const std::string id = fmt::format("group {}", found.hash_value());
+      if (groups_.count(id) == 0) {
+        groups_[id];
+        for (const Node& part : found.children("shape")) shape(part, id, {});
+      }
+      size_t number = 0;
+      for (const Part& part : groups_[id])
+        for (const Geometry& g : part.geometry)
+          build_.add(part.name, g, place * part.place, part.material, part.flipped, fmt::format("{} {}", id, number++));
+    }
+  }
+
+  // ---- Camera and lights
+
+  void sensor(const Node& node) {
+    if (has_camera_) return build_.leave_out("all sensors but the first");
+    const std::string kind = text(node, "type");
+    for (const Node& film : node.children("film")) {
+      const double width = number(film, "width", 768), height = number(film, "height", 576);
+      if (!(width >= 1 && width <= 65536 && height >= 1 && height <= 65536))
+        fail(film, fmt::format("has {} by {} pixels", width, height));
+      build_.scene.width = static_cast<uint32_t>(width), build_.scene.height = static_cast<uint32_t>(height);
+      if (child(film, "crop_width")) build_.leave_out("the film's crop");
+    }
+    const Affine world = place_of(node);
+    if (!(std::abs(world.determinant()) > 0)) fail(node, "its to_world flattens space");
+    lumicut_camera& c = build_.scene.camera;
+    c.struct_size = sizeof(c);
+    // It looks along z, and x goes to the left.
+    const Vec x = unit(world.column(0)) * -1.0, y = unit(world.column(1)), z = unit(world.column(2)) * -1.0;
+    for (size_t r = 0; r < 3; ++r) {
+      const double row[4] = {x[r], y[r], z[r], world.column(3)[r]};
+      for (size_t k = 0; k < 4; ++k) c.to_world[4 * r + k] = static_cast<float>(row[k]);
+    }
+    const double aspect = double(build_.scene.width) / build_.scene.height;
+    if (kind == "orthographic") {
+      c.orthographic = 1;
+      c.height = static_cast<float>(2 * length(world.column(1)) / aspect);
+    } else {
+      if (kind != "perspective" && kind != "thinlens")
+        build_.approximate(fmt::format("sensors of the kind {} are perspective", kind));
+      c.fov_y = static_cast<float>(field_of_view(node, aspect));
+    }
+    c.shift[0] = static_cast<float>(number(node, "principal_point_offset_x", 0) * -aspect);
+    c.shift[1] = static_cast<float>(number(node, "principal_point_offset_y", 0));
+    if (kind == "thinlens") {
+      c.lens_radius = static_cast<float>(number(node, "aperture_radius", 0));
+      c.focus_distance = static_cast<float>(number(node, "focus_distance", 1));
+    }
+    has_camera_ = true;
+  }
+  double field_of_view(const Node& node, double aspect) const {
+    std::string axis = word(node, "fov_axis", "x");
+    double fov = radians(number(node, "fov", 0));
+    if (const Node c = child(node, "focal_length"); c && fov == 0) {
+      // Of a film of 36 by 24 mm.
+      const auto list = numbers(c, text(c, "value").substr(0, text(c, "value").find("mm")));
+      if (list.size() != 1 || !(list[0] > 0)) fail(c, "is no length in mm");
+      fov = 2 * std::atan(std::hypot(36.0, 24.0) / 2 / list[0]);
+      axis = "diagonal";
+    }
+    if (!(fov > 1e-3 && fov < radians(179))) fail(node, fmt::format("its fov is {} degrees", fov * 180 / kPi));
+    const double tangent = std::tan(fov / 2);
+    if (axis == "y" || (axis == "smaller" && aspect >= 1) || (axis == "larger" && aspect < 1)) return fov;
+    if (axis == "diagonal") return 2 * std::atan(tangent / std::hypot(aspect, 1.0));
+    if (axis != "x" && axis != "smaller" && axis != "larger")
+      fail(node, fmt::format("its fov_axis is \"{}\"", shown(axis)));
+    return 2 * std::atan(tangent / aspect);
+  }
+
+  Vec light_colour(const Node& node, const char* name) {
+    const Node c = child(node, name);
+    if (!c) return {1, 1, 1};
+    if (std::string(c.name()) == "texture") {
+      build_.leave_out(fmt::format("textures of {}", name));
+      return {1, 1, 1};
+    }
+    const Vec out = colour(c, true);
+    for (const double v : out)
+      if (!(v >= 0 && v <= 1e15)) fail(c, fmt::format("has the value {}", v));
+    return out;
+  }
+  void emitter(const Node& node) {
+    const std::string kind = text(node, "type");
+    const std::string name = node.attribute("id") ? text(node, "id") : fmt::format("emitter \"{}\"", kind);
+    const Affine place = place_of(node);
+    lumicut_light l{};
+    l.value = 1;
+    if (kind == "point") {
+      l.type = LUMICUT_POINT;
+      store(l.position, child(node, "position") ? vector_of(child(node, "position"), {0, 0, 0}) : place.column(3));
+      store(l.color, light_colour(node, "intensity"));
+      build_.add_light(l, name);
+    } else if (kind == "spot") {
+      const double cutoff = number(node, "cutoff_angle", 20), beam = number(node, "beam_width", cutoff * 3 / 4);
+      if (!(cutoff > 0 && cutoff <= 90 && beam >= 0 && beam <= cutoff))
+        fail(node, fmt::format("its angles are {} and {} degrees", beam, cutoff));
+      // Even to the beam's edge, then linear in the angle.
+      std::vector<float> angles = {0}, values = {1};
+      if (beam > 0) angles.push_back(static_cast<float>(radians(beam))), values.push_back(1);
+      if (cutoff > beam + 1e-3) angles.push_back(static_cast<float>(radians(cutoff))), values.push_back(0);
+      if (child(node, "texture")) build_.leave_out("textures of spots");
+      build_.add_profile_light(place.column(3), place.column(2), light_colour(node, "intensity"), angles, values, name);
+    } else if (kind == "directional") {
+      l.type = LUMICUT_SUN;
+      const Vec direction = child(node, "direction") ? vector_of(child(node, "direction"), {0, 0, 1}) : place.column(2);
+      if (!(length(direction) > 0)) fail(node, "has no direction");
+      store(l.direction, unit(direction));
+      store(l.color, light_colour(node, "irradiance"));
+      build_.add_light(l, name);
+    } else if (kind == "constant" || kind == "envmap") {
+      if (build_.scene.environment) build_.leave_out("all environments but the last");
+      lumicut_environment e{};
+      e.struct_size = sizeof(e);
+      Vec rgb{1, 1, 1};
+      if (kind == "constant") {
+        rgb = light_colour(node, "radiance");
+      } else {
+        const double scale = number(node, "scale", 1);
+        if (!(scale >= 0 && scale <= 1e15)) fail(node, fmt::format("its scale is {}", scale));
+        rgb = {scale, scale, scale};
+        e.texture = build_.image(word(node, "filename", ""), TextureUse::radiance, 0);
+        if (place.determinant() < 0) build_.approximate("mirrored environments are not mirrored");
+        // Its local y is up, and the picture's middle lies along z.
+        const Vec rows[3] = {unit(place.column(2)), unit(place.column(0)), unit(place.column(1))};
+        for (size_t r = 0; r < 3; ++r)
+          for (size_t c = 0; c < 3; ++c) e.world_to_map[3 * r + c] = static_cast<float>(rows[r][c]);
+      }
+      store(e.color, rgb);
+      build_.scene.environment = e;
+    } else {
+      build_.leave_out(fmt::format("emitters of the kind {}", kind));
+    }
+  }
+
+  SceneBuilder build_;
+  std::list<pugi::xml_document> documents_;
+  std::map<std::string, std::string> defaults_;
+  std::map<std::string, Node> ids_;
+  std::map<std::pair<size_t, bool>, PaintRef> paints_;
+  std::map<size_t, uint32_t> materials_;
+  std::map<std::string, std::vector<Part>> groups_;
+  std::optional<Geometry> sphere_;
+  uint32_t grey_ = 0;
+  int depth_ = 0;
+  bool has_camera_ = false;
+};
+
+}  // namespace
+
+bool is_mitsuba(const std::string& path) { return lower(std::filesystem::path(path).extension().string()) == ".xml"; }
+
+SceneData read_mitsuba(const std::string& path) { return Reader(path).read(); }
+
+}  // namespace lumicut::io

@@ -1,0 +1,183 @@
+"""Mitsuba 3 scenes, which the test writes: against formulas, and against the same scene as JSON."""
+import json
+import math
+import os
+import unittest
+
+import numpy as np
+
+import test_gltf
+import test_models
+from cli import BAD_FILE, OK, lumicut
+from test_pbrt import SceneFiles
+
+
+def scene(*parts):
+    return '<scene version="3.0.0">\n' + "\n".join(parts) + "\n</scene>\n"
+
+
+def camera(eye, at, fov=40, size=(48, 36), up="0, 1, 0", more=""):
+    eye, at = (", ".join(map(str, v)) for v in (eye, at))
+    return (f'<sensor type="perspective"><float name="fov" value="{fov}"/>{more}<transform name="to_world"><lookat origin="{eye}" target="{at}" '
+            f'up="{up}"/></transform><film type="hdrfilm"><integer name="width" value="{size[0]}"/><integer name="height" value="{size[1]}"/></film></sensor>')
+
+
+def rgb(name, *values):
+    return f'<rgb name="{name}" value="{", ".join(map(str, values))}"/>'
+
+
+def placed(*steps):
+    return f'<transform name="to_world">{"".join(steps)}</transform>'
+
+
+FLOOR = ('<shape type="rectangle">' + placed('<rotate x="1" angle="-90"/>') +
+         '<bsdf type="diffuse"><rgb name="reflectance" value=".5"/></bsdf></shape>')
+
+
+class Mitsuba(SceneFiles):
+    def floor(self, *lights, eye=(0, 4, 0.001)):
+        return self.write("floor.xml", scene(camera(eye, (0, 0, 0), 1, (8, 8)), FLOOR, *lights))
+
+    def test_light_of_lamps_is_what_the_formulas_say(self):
+        down = placed('<lookat origin="0, 2, 0" target="0, 0, 0" up="0, 0, 1"/>')
+        for light, expected in (
+                ('<emitter type="point"><point name="position" x="0" y="2" z="0"/>' + rgb("intensity", 8, 4, 2) + "</emitter>", np.array([8, 4, 2]) / 4),
+                ('<emitter type="point"><rgb name="intensity" value="8"/>' + placed('<translate y="2"/>') + "</emitter>", np.full(3, 8 / 4)),
+                ('<emitter type="spot"><spectrum name="intensity" value="6"/>' + down + "</emitter>", np.full(3, 6 / 4)),
+                ('<emitter type="directional"><vector name="direction" value="0, -1, -1"/>' + rgb("irradiance", 3, 2, 1) + "</emitter>",
+                 np.array([3, 2, 1]) / math.sqrt(2)),
+                ('<emitter type="constant">' + rgb("radiance", 2, 1, 0.5) + "</emitter>", math.pi * np.array([2, 1, 0.5]))):
+            with self.subTest(light):
+                np.testing.assert_allclose(self.lamp(self.floor(light)), 0.5 / math.pi * expected, rtol=0.02 if "constant" in light else 2e-3)
+
+    def test_the_spot_falls_off_linearly_in_the_angle(self):
+        # At 25 degrees, half way between the beam's 20 and the cut at 30.
+        target = f"{2 * math.tan(math.radians(25))}, 0, 0"
+        light = ('<emitter type="spot"><float name="cutoff_angle" value="30"/><float name="beam_width" value="20"/><rgb name="intensity" value="1"/>' +
+                 placed(f'<lookat origin="0, 2, 0" target="{target}" up="0, 0, 1"/>') + "</emitter>")
+        np.testing.assert_allclose(self.lamp(self.floor(light)), 0.5 / math.pi * 0.5 / 4, rtol=3e-3)
+
+    def test_area_lights_emit_on_the_side_of_their_normal(self):
+        expected = 0.5 * 2 * 0.25 / 1.25  # rho L sin² of the disk's half angle
+        for steps, more, lit in ((('<scale value=".5"/>', '<rotate x="1" angle="90"/>'), "", True), (('<scale value=".5"/>', '<rotate x="1" angle="-90"/>'), "", False),
+                                 (('<scale value=".5"/>', '<rotate x="1" angle="-90"/>'), '<boolean name="flip_normals" value="true"/>', True),
+                                 (('<scale x=".5" y="-.5" z=".5"/>', '<rotate x="1" angle="90"/>'), "", True)):
+            with self.subTest(steps=steps, more=more):
+                light = ('<shape type="disk">' + more + placed(*steps, '<translate y="1"/>') +
+                         '<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf><emitter type="area"><rgb name="radiance" value="2"/></emitter></shape>')
+                np.testing.assert_allclose(self.lamp(self.floor(light, eye=(0, 0.5, 0.001))), expected if lit else 0, rtol=0.02)
+
+    def test_the_sky_lies_as_its_axes_say(self):
+        # The left edge of a picture lies towards -z, a quarter is +x, the middle +z; the top is y.
+        for (x, y), seen in (((16, 8), (0, 0, 1)), ((8, 8), (1, 0, 0)), ((24, 8), (-1, 0, 0)), ((8, 0), (0, 1, 0))):
+            pixels = np.zeros((16, 32, 3), np.float32)
+            if y == 0:
+                pixels[:2] = 1
+            else:
+                pixels[y - 2:y + 2, x - 2:x + 2] = 1
+            self.write_exr("sky.exr", pixels)
+            for turn, along in ((None, seen), ('<rotate y="1" angle="90"/>', (seen[2], seen[1], -seen[0]))):
+                up = "0, 1, 0" if along[1] == 0 else "1, 0, 0"
+                world = placed(turn) if turn else ""
+                path = self.write("sky.xml", scene(
+                    camera((0, 0, 0), along, 4, (5, 5), up), '<emitter type="envmap"><string name="filename" value="sky.exr"/>' + world + "</emitter>",
+                    '<shape type="sphere"><point name="center" x="50" y="50" z="50"/></shape>'))
+                # At the pole half a texel is mixed with the other one.
+                self.assertGreater(self.render(path, "--vpls", 10)[0].mean(), 0.6, (seen, turn))
+
+    def write_exr(self, name, pixels):
+        out = test_models.oiio.ImageOutput.create(str(self.folder / name))
+        out.open(str(self.folder / name), test_models.oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "float"))
+        out.write_image(np.ascontiguousarray(pixels))
+        out.close()
+
+    def test_a_room_is_what_it_is_as_json(self):
+        """Defaults, references, an include, a mesh of a file, a cube, an instance, textures, a two-sided material."""
+        (self.folder / "dots.png").write_bytes(test_gltf.png(2, 2, [(255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 255)]))
+        self.write("quad.obj", "v -3 0 3\nv 3 0 3\nv 3 0 -3\nv -3 0 -3\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n")
+        self.write("parts.xml", scene('<bsdf type="twosided" id="red"><bsdf type="diffuse">' + rgb("reflectance", 0.7, 0.2, 0.1) + "</bsdf></bsdf>"))
+        path = self.write("room.xml", scene(
+            '<default name="light" value="40"/>', '<include filename="parts.xml"/>', camera((3, 4, 6), (0, 0.5, 0), more='<string name="fov_axis" value="y"/>'),
+            '<emitter type="point"><point name="position" value="2, 5, 3"/><rgb name="intensity" value="$light"/></emitter>',
+            '<shape type="obj"><string name="filename" value="quad.obj"/><bsdf type="diffuse"><texture name="reflectance" type="bitmap">'
+            '<string name="filename" value="dots.png"/><string name="filter_type" value="nearest"/></texture></bsdf></shape>',
+            '<shape type="cube">' + placed('<scale value=".5"/>', '<rotate y="1" angle="30"/>', '<translate x="-1" y=".5" z="1"/>') + '<ref id="red"/></shape>',
+            '<shape type="shapegroup" id="group"><shape type="rectangle"><ref id="red"/></shape></shape>',
+            '<shape type="instance"><ref id="group"/>' + placed('<translate x="1" y="1"/>') + "</shape>"))
+        c, s = math.cos(math.radians(30)), math.sin(math.radians(30))
+        corners = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
+        expected = self.write("room.json", {
+            "image": {"size": [48, 36]}, "camera": {"eye": [3, 4, 6], "at": [0, 0.5, 0], "fov_y": 40},
+            "lights": [{"type": "point", "position": [2, 5, 3], "value": 40}],
+            "materials": [{"name": "dots", "diffuse_texture": {"file": "dots.png", "nearest": True}, "diffuse": [1, 1, 1]},
+                          {"name": "red", "diffuse": [0.7, 0.2, 0.1]}],
+            "meshes": [{"positions": [[-3, 0, 3], [3, 0, 3], [3, 0, -3], [-3, 0, -3]], "quads": [[0, 1, 2, 3]],
+                        "uvs": [[0, 0], [1, 0], [1, 1], [0, 1]], "material": "dots"},
+                       {"positions": [[c * x + s * z - 1, y + 0.5, -s * x + c * z + 1] for x, y, z in corners],
+                        "quads": [list(f) for f in test_models.BOX[1]], "material": "red"},
+                       {"positions": [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]], "quads": [[0, 1, 2, 3]], "material": "red"}]})
+        self.assert_same(self.render(path, "--vpls", 500)[0], self.render(expected, "--vpls", 500)[0])
+
+    def test_textures_of_rectangles_have_their_first_row_below(self):
+        # v is 0 where y is -1, and pictures begin there.
+        (self.folder / "four.png").write_bytes(test_gltf.png(2, 2, [(255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 255)]))
+        path = self.write("flat.xml", scene(
+            camera((0, 0, 3), (0, 0, 0), 30, (4, 4)), '<emitter type="constant"/>', '<shape type="rectangle"><bsdf type="diffuse"><texture name="reflectance" '
+            'type="bitmap"><string name="filename" value="four.png"/><string name="filter_type" value="nearest"/></texture></bsdf></shape>'))
+        albedo = self.render(path, "--vpls", 10, layers="albedo")[0]
+        for (y, x), wanted in (((3, 0), (1, 0, 0)), ((3, 3), (0, 1, 0)), ((0, 0), (0, 0, 1)), ((0, 3), (1, 1, 1))):
+            np.testing.assert_allclose(albedo[y, x], wanted, atol=1e-4)
+
+    def test_materials_are_what_they_are_as_json(self):
+        bsdf = '<bsdf type="{}">{}</bsdf>'.format
+        ggx = '<string name="distribution" value="ggx"/><float name="alpha" value="{}"/>'.format
+        for text, keys in (
+                (bsdf("diffuse", rgb("reflectance", 0.2, 0.4, 0.6)), {"diffuse": [0.2, 0.4, 0.6]}),
+                (bsdf("plastic", rgb("diffuse_reflectance", 0.2, 0.4, 0.6) + '<float name="int_ior" value="1.3"/><float name="ext_ior" value="1"/>'),
+                 {"model": "ggx", "diffuse": [0.2, 0.4, 0.6], "roughness": 0, "ior": 1.3}),
+                (bsdf("roughplastic", ggx(0.25) + '<string name="int_ior" value="water"/><string name="ext_ior" value="vacuum"/>'),
+                 {"model": "ggx", "diffuse": [0.5, 0.5, 0.5], "roughness": 0.5, "ior": 1.333}),
+                (bsdf("roughconductor", ggx(0.25) + '<string name="material" value="none"/>' + rgb("specular_reflectance", 0.9, 0.6, 0.3)),
+                 {"model": "ggx", "metallic": 1, "diffuse": [0.9, 0.6, 0.3], "roughness": 0.5}),
+                (bsdf("dielectric", '<float name="int_ior" value="1.4"/><float name="ext_ior" value="1"/>'),
+                 {"model": "ggx", "transmission": 1, "diffuse": [1, 1, 1], "roughness": 0, "ior": 1.4}),
+                (bsdf("principled", rgb("base_color", 0.2, 0.4, 0.6) + '<float name="roughness" value=".3"/><float name="metallic" value=".4"/>'
+                      '<float name="eta" value="1.4"/>'),
+                 {"model": "ggx", "burley": True, "diffuse": [0.2, 0.4, 0.6], "roughness": 0.3, "metallic": 0.4, "ior": 1.4,
+                  "coat_roughness": math.sqrt(0.1)}),
+                (bsdf("mask", '<float name="opacity" value=".25"/>' + bsdf("diffuse", "")), {"diffuse": [0.5, 0.5, 0.5], "opacity": 0.25})):
+            with self.subTest(text):
+                path = self.write("ball.xml", scene(
+                    camera((0, 0, 5), (0, 0, 0)), '<emitter type="directional"><vector name="direction" value="-1, -2, -3"/></emitter>', '<emitter type="constant">' + rgb("radiance", 0.1, 0.2, 0.3) + "</emitter>",
+                    f'<shape type="sphere"><float name="radius" value="1.2"/>{text}</shape>'))
+                self.assert_ends(lumicut("convert", path, self.folder / "ball.json"), OK)
+                again = json.loads((self.folder / "ball.json").read_text())
+                for material in again["materials"]:
+                    name = material["name"]
+                    material.clear()
+                    material.update({"name": name} | keys)
+                self.assert_same(self.render(path, "--vpls", 100)[0], self.render(self.write("again.json", again), "--vpls", 100)[0])
+
+    def test_what_is_not_supported_is_named(self):
+        path = self.floor('<emitter type="projector"/>', '<medium type="homogeneous"/>', '<emitter type="point"/>',
+                          '<shape type="bsplinecurve"/>', '<shape type="sphere"><bsdf type="hair"/></shape>')
+        _, said = self.render(path, "--vpls", 10)
+        for text in ("emitters of the kind projector: left out", "media: left out", "bsdfs of the kind hair are diffuse", "shapes of the kind bsplinecurve: left out"):
+            self.assertIn(text, said)
+
+    def test_wrong_files_are_refused_by_name(self):
+        os.mkfifo(self.folder / "pipe.xml")
+        self.write("loop.xml", scene('<include filename="loop.xml"/>'))
+        deep = '<bsdf type="twosided">' * 100 + '<bsdf type="diffuse"/>' + "</bsdf>" * 100
+        for part, texts in (("<shape", ("bad.xml", "byte")), ('<shape type="sphere"><float name="radius" value="x"/></shape>', ("<float", "x")),
+                            ('<shape type="sphere"><ref id="none"/></shape>', ("none", "no such id")), ('<include filename="loop.xml"/>', ("loop.xml", "without end")),
+                            ('<include filename="pipe.xml"/>', ("pipe.xml",)), ('<shape type="obj"><string name="filename" value="no.obj"/></shape>', ("no.obj",)),
+                            (f'<shape type="sphere">{deep}</shape>', ("without end",)), (camera((0, 0, 0), (0, 0, 0)), ("lookat", "own place")),
+                            ('<shape type="sphere"><float name="radius" value="$no"/></shape>', ("$no",)), (camera((0, 0, 1), (0, 0, 0), 400), ("fov", "400"))):
+            with self.subTest(part[:60]):
+                self.assert_ends(lumicut("render", self.write("bad.xml", scene(FLOOR, part)), "-o", self.folder / "x.exr"), BAD_FILE, *texts)
+        self.assert_ends(lumicut("render", self.write("odd.xml", "<html/>"), "-o", self.folder / "x.exr"), BAD_FILE, "odd.xml", "<scene>")
+
+
+if __name__ == "__main__":
+    unittest.main()

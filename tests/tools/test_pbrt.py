@@ -1,0 +1,207 @@
+"""pbrt-v4 scenes, which the test writes: against formulas, and against the same scene as JSON."""
+import json
+import math
+import os
+import unittest
+
+import numpy as np
+
+import cli
+import test_gltf
+import test_models
+from cli import BAD_FILE, OK, ROOT, SCENE, lumicut
+
+SCENES = ROOT / "tests/tools/scenes"
+HEAD = 'Film "rgb" "integer xresolution" [ 48 ] "integer yresolution" [ 36 ]\n'
+
+
+def look(eye, at, up=(0, 1, 0)):
+    return "LookAt " + "  ".join(" ".join(map(str, v)) for v in (eye, at, up)) + "\n"
+
+
+class SceneFiles(cli.Cli):
+    def write(self, name, text):
+        path = self.folder / name
+        path.write_text(text if isinstance(text, str) else json.dumps(text))
+        return path
+
+    def render(self, path, *words, layers="radiance", method="exhaustive"):
+        out = self.folder / (path.name + ".exr")
+        done = lumicut("render", path, "-o", out, "--layers", layers, "-i", method, "--seed", 1, *words)
+        self.assertEqual(done.returncode, OK, done.stderr)
+        image = test_models.oiio.ImageInput.open(str(out))
+        spec = image.spec()
+        return image.read_image("float").reshape(spec.height, spec.width, -1), done.stderr
+
+    def assert_same(self, a, b, share=1e-3, off=0.01):
+        self.assertEqual(a.shape, b.shape)
+        self.assertGreater(b.max(), 0)
+        self.assertLess((np.abs(a - b).max(axis=2) > share * b.max()).mean(), off)
+
+    def lamp(self, scene, place="7x7"):
+        """Radiance of a floor of reflectance .5 in the middle, of light that comes straight from lamps."""
+        return self.render(scene, "--size", place, "--vpls", 2000, "-p", "clamp_lights=0")[0][3, 3]
+
+
+class Pbrt(SceneFiles):
+    def floor(self, lights, material='Material "diffuse" "rgb reflectance" [ .5 .5 .5 ]', head=""):
+        return self.write("floor.pbrt", head + 'Film "rgb" "integer xresolution" 8 "integer yresolution" 8\n' + look((0, 4, 0.001), (0, 0, 0)) +
+                          f'Camera "perspective" "float fov" 1\nWorldBegin\n{lights}\n{material}\n'
+                          'Shape "trianglemesh" "point3 P" [ -1 0 1  1 0 1  1 0 -1  -1 0 -1 ] "integer indices" [ 0 1 2 0 2 3 ]\n')
+
+    def test_light_of_lamps_is_what_the_formulas_say(self):
+        for light, expected in (
+                ('LightSource "point" "rgb I" [ 8 4 2 ] "point3 from" [ 0 2 0 ]', np.array([8, 4, 2]) / 4),
+                ('LightSource "point" "float power" 100 "point3 from" [ 0 2 0 ]', np.full(3, 100 / (4 * math.pi) / 4)),
+                ('LightSource "spot" "rgb I" [ 1 1 1 ] "float scale" 6 "point3 from" [ 0 2 0 ] "point3 to" [ 0 0 0 ]', np.full(3, 6 / 4)),
+                ('Translate 0 2 0 Rotate 90 1 0 0 LightSource "spot" "rgb I" [ 6 6 6 ]', np.full(3, 6 / 4)),  # along z
+                ('LightSource "distant" "rgb L" [ 3 2 1 ] "point3 from" [ 0 1 1 ] "point3 to" [ 0 0 0 ]', np.array([3, 2, 1]) / math.sqrt(2)),
+                ('LightSource "distant" "float illuminance" 5 "point3 from" [ 0 1 0 ] "point3 to" [ 0 0 0 ]', np.full(3, 5)),
+                ('LightSource "infinite" "rgb L" [ 1 .5 .25 ] "float scale" 2', math.pi * np.array([2, 1, 0.5]))):
+            with self.subTest(light):
+                found = self.lamp(self.floor(f"AttributeBegin {light} AttributeEnd"))
+                # The environment's virtual lights are a few thousand directions.
+                np.testing.assert_allclose(found, 0.5 / math.pi * expected, rtol=0.02 if "infinite" in light else 2e-3)
+
+    def test_the_spot_falls_off_as_its_cosines_say(self):
+        # Half way between the cosines of 20 and 40 degrees the light is half of that in the middle.
+        half = math.acos((math.cos(math.radians(20)) + math.cos(math.radians(40))) / 2)
+        light = ('LightSource "spot" "rgb I" [ 1 1 1 ] "float coneangle" 40 "float conedeltaangle" 20 "point3 from" [ 0 2 0 ] '
+                 f'"point3 to" [ {2 * math.tan(half)} 0 0 ]')
+        np.testing.assert_allclose(self.lamp(self.floor(light)), 0.5 / math.pi * 0.5 / 4, rtol=3e-3)
+
+    def test_area_lights_emit_on_the_side_of_their_normal(self):
+        disk = 'AttributeBegin Translate 0 1 0 Rotate {} 1 0 0 {} Material "diffuse" "rgb reflectance" [ 0 0 0 ] AreaLightSource "diffuse" "rgb L" [ 2 2 2 ] {} Shape "disk" "float radius" .5 AttributeEnd'
+        expected = 0.5 * 2 * 0.25 / 1.25  # rho L sin² of the disk's half angle
+        for angle, words, more, lit in ((90, "", "", True), (-90, "", "", False), (-90, "ReverseOrientation", "", True),
+                                        (-90, "", '"bool twosided" true', True), (-90, "Scale 1 1 -1", "", False), (90, "Scale -1 1 1", "", False)):
+            with self.subTest(angle=angle, words=words, more=more):
+                camera_below = self.floor(disk.format(angle, words, more)).read_text().replace("LookAt 0 4 0.001", "LookAt 0 0.5 0.001")
+                found = self.lamp(self.write("below.pbrt", camera_below))
+                # Of 2,000 places on both sides half lie behind.
+                np.testing.assert_allclose(found, expected if lit else 0, rtol=0.05 if more else 0.02)
+
+    def test_a_mirror_of_gold_reflects_as_gold(self):
+        # Straight down a wall of light lies above: what comes back is Fresnel's reflectance of gold at 0 degrees.
+        sky = 'LightSource "infinite" "rgb L" [ 1 1 1 ]'
+        scene = self.floor(sky, 'Material "conductor" "spectrum eta" "metal-Au-eta" "spectrum k" "metal-Au-k" "float roughness" 0')
+        found = self.render(scene, "--vpls", 100)[0][4, 4]
+        for value, (eta, k) in zip(found, ((0.1431, 3.9832), (0.3750, 2.3857), (1.4424, 1.6032))):
+            self.assertAlmostEqual(value, ((eta - 1) ** 2 + k * k) / ((eta + 1) ** 2 + k * k), delta=0.01)
+
+    def test_a_room_is_what_it_is_as_json(self):
+        """Include, named materials, coordinate systems, instances, a sphere, a textured quad, a left-handed camera."""
+        (self.folder / "dots.png").write_bytes(test_gltf.png(2, 2, [(255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 255)]))
+        self.write("parts.pbrt", 'MakeNamedMaterial "red" "string type" "diffuse" "rgb reflectance" [ .7 .2 .1 ]\n'
+                   'Texture "dots" "spectrum" "imagemap" "string filename" "dots.png" "string filter" "point"\n')
+        scene = self.write("room.pbrt", "# A room\nScale -1 1 1\n" + look((3, 4, 6), (0, 0.5, 0)) + 'Camera "perspective" "float fov" [ 40 ]\n' + HEAD +
+                           'WorldBegin\nInclude "parts.pbrt"\nLightSource "point" "rgb I" [ 40 40 40 ] "point3 from" [ 2 5 3 ]\n'
+                           'AttributeBegin Material "diffuse" "texture reflectance" "dots"\nShape "trianglemesh" "integer indices" [0 1 2 0 2 3]'
+                           '"point3 P" [-3 0 3  3 0 3  3 0 -3  -3 0 -3] "point2 uv" [0 0 1 0 1 1 0 1]\nAttributeEnd\n'
+                           'ObjectBegin "block" Identity NamedMaterial "red" Shape "bilinearmesh" "point3 P" [-.5 0 0 .5 0 0 -.5 1 0 .5 1 0] ObjectEnd\n'
+                           'AttributeBegin Translate -1 0 1 ObjectInstance "block" AttributeEnd\n'
+                           'AttributeBegin ConcatTransform [ 0 0 -1 0  0 2 0 0  1 0 0 0  1 0 1 1 ] ObjectInstance "block" AttributeEnd\n')
+        expected = self.write("room.json", {
+            "image": {"size": [48, 36]}, "camera": {"eye": [3, 4, 6], "at": [0, 0.5, 0], "fov_y": 40},
+            "lights": [{"type": "point", "position": [2, 5, 3], "value": 40}],
+            "materials": [{"name": "dots", "diffuse_texture": {"file": "dots.png", "nearest": True}, "diffuse": [1, 1, 1]},
+                          {"name": "red", "diffuse": [0.7, 0.2, 0.1]}],
+            "meshes": [{"positions": [[-3, 0, 3], [3, 0, 3], [3, 0, -3], [-3, 0, -3]], "quads": [[0, 1, 2, 3]],
+                        "uvs": [[0, 0], [1, 0], [1, 1], [0, 1]], "material": "dots"},
+                       {"positions": [[-.5, 0, 0], [.5, 0, 0], [.5, 1, 0], [-.5, 1, 0]], "quads": [[0, 1, 2, 3]], "material": "red",
+                        "instances": [{"translate": [-1, 0, 1]}, [0, 0, 1, 1, 0, 2, 0, 0, -1, 0, 0, 1]]}]})
+        wanted = self.render(expected, "--vpls", 500)[0]
+        self.assert_same(self.render(scene, "--vpls", 500)[0], wanted)
+        # Without Scale -1 1 1 pbrt's world is left-handed, and the picture the other way round.
+        self.write("room.pbrt", scene.read_text().replace("Scale -1 1 1\n", "").replace("3 4 6", "-3 4 6").replace("[ 2 5 3 ]", "[ -2 5 3 ]")
+                   .replace("WorldBegin", "WorldBegin Scale -1 1 1").replace("from\" [ -2", "from\" [ 2"))
+        # Bounced light starts in directions that are not mirrored.
+        self.assert_same(self.render(scene, "--vpls", 500)[0], wanted, 0.1)
+
+    def test_spheres_and_materials_are_what_they_are_as_json(self):
+        materials = (('"diffuse" "rgb reflectance" [ .2 .4 .6 ]', {"diffuse": [0.2, 0.4, 0.6]}),
+                     ('"coateddiffuse" "rgb reflectance" [ .2 .4 .6 ] "float roughness" .0625', {"model": "ggx", "diffuse": [0.2, 0.4, 0.6], "roughness": 0.5}),
+                     ('"conductor" "rgb reflectance" [ .9 .6 .3 ] "float roughness" .25 "bool remaproughness" false',
+                      {"model": "ggx", "metallic": 1, "diffuse": [0.9, 0.6, 0.3], "roughness": 0.5}),
+                     ('"dielectric" "float eta" 1.3', {"model": "ggx", "transmission": 1, "diffuse": [1, 1, 1], "roughness": 0, "ior": 1.3}))
+        for text, keys in materials:
+            with self.subTest(text):
+                scene = self.write("ball.pbrt", look((0, 0, 5), (0, 0, 0)) + HEAD + 'Camera "perspective" "float fov" 40\nWorldBegin\n'
+                                   f'LightSource "distant" "rgb L" [2 2 2] "point3 from" [1 2 3] "point3 to" [0 0 0]\nLightSource "infinite" "rgb L" [.1 .2 .3]\nMaterial {text}\nShape "sphere" "float radius" 1.2')
+                self.assert_ends(lumicut("convert", scene, self.folder / "ball.json"), OK)
+                again = json.loads((self.folder / "ball.json").read_text())
+                # The same ball of the material that is written down.
+                for material in again["materials"]:
+                    name = material["name"]
+                    material.clear()
+                    material.update({"name": name} | keys)
+                self.assert_same(self.render(scene, "--vpls", 100)[0], self.render(self.write("again.json", again), "--vpls", 100)[0])
+
+    def test_checkers_mixes_and_scales_are_computed_at_the_hit(self):
+        texture = ('Texture "two" "spectrum" "checkerboard" "float uscale" 2 "float vscale" 2 "rgb tex1" [ .8 .8 .8 ] "rgb tex2" [ .2 .2 .2 ]\n'
+                   'Texture "dim" "spectrum" "scale" "texture tex" "two" "float scale" .5\n'
+                   'Texture "both" "spectrum" "mix" "texture tex1" "dim" "rgb tex2" [ 0 0 0 ] "float amount" .25\n')
+        scene = self.write("check.pbrt", HEAD.replace("48", "4").replace("36", "4") + look((0, 0, 3), (0, 0, 0), (0, 1, 0)).replace("LookAt", "Scale -1 1 1 LookAt") +
+                           f'Camera "orthographic"\nWorldBegin\n{texture}Material "diffuse" "texture reflectance" "both"\n'
+                           'LightSource "infinite"\nShape "bilinearmesh" "point3 P" [-1 -1 0 1 -1 0 -1 1 0 1 1 0]')
+        albedo = self.render(scene, "--vpls", 10, layers="albedo")[0][:, :, 0]
+        # (0, 0) is even, below on the left.
+        bright, dark = 0.8 * 0.5 * 0.75, 0.2 * 0.5 * 0.75
+        for (y, x), wanted in (((3, 0), bright), ((3, 3), dark), ((0, 0), dark), ((0, 3), bright)):
+            self.assertAlmostEqual(albedo[y, x], wanted, delta=1e-5)
+
+    def test_the_octahedral_sky_lies_as_its_axes_say(self):
+        # A picture of one bright direction each: the middle of the square is +z, its corners -z, the middles of its sides x and y.
+        for (x, y), seen in (((8, 8), (0, 0, 1)), ((15, 8), (1, 0, 0)), ((8, 15), (0, 1, 0)), ((0, 8), (-1, 0, 0))):
+            pixels = np.zeros((17, 17, 3), np.float32)
+            pixels[max(0, y - 1):y + 2, max(0, x - 1):x + 2] = 1
+            self.write_exr("sky.exr", pixels)
+            up = (0, 1, 0) if seen[1] == 0 else (1, 0, 0)
+            scene = self.write("sky.pbrt", look((0, 0, 0), seen, up) + 'Film "rgb" "integer xresolution" 5 "integer yresolution" 5\n'
+                               'Camera "perspective" "float fov" 4\nWorldBegin\nLightSource "infinite" "string filename" "sky.exr"\n'
+                               'Translate 50 50 50 Shape "sphere"')
+            # At the pole half a texel is mixed with the other one.
+            self.assertGreater(self.render(scene, "--vpls", 10)[0].mean(), 0.6, seen)
+
+    def write_exr(self, name, pixels):
+        out = test_models.oiio.ImageOutput.create(str(self.folder / name))
+        out.open(str(self.folder / name), test_models.oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "float"))
+        out.write_image(np.ascontiguousarray(pixels))
+        out.close()
+
+    def test_the_cornell_box_is_that_of_the_reference_images_in_pbrt_and_mitsuba(self):
+        box = json.loads(SCENE.read_text())
+        box["meshes"][0] = {"obj": str(SCENE.parent / "cornell_box.obj"), "materials": {"shiny": {"diffuse": [0.73] * 3, "specular": [0, 0, 0]}}}
+        words = ("--size", "64x64", "--vpls", 3000)
+        wanted = self.render(self.write("box.json", box), *words)[0]
+        for name in ("cornell.pbrt", "cornell.xml"):
+            found = self.render(SCENES / name, *words)[0]
+            # The blocks are squares there and nearly squares here: their edges differ, and the walls within the noise of 3,000 lights.
+            self.assertLess((np.abs(found - wanted).max(axis=2) > 0.1 * np.median(wanted)).mean(), 0.12, name)
+            np.testing.assert_allclose(found[2:10, 40:60].mean(axis=(0, 1)), wanted[2:10, 40:60].mean(axis=(0, 1)), rtol=0.03, err_msg=name)
+            np.testing.assert_allclose(np.median(found), np.median(wanted), rtol=0.03, err_msg=name)
+
+    def test_what_is_not_supported_is_named(self):
+        _, said = self.render(self.floor('LightSource "projection"\nLightSource "point"\nMakeNamedMedium "fog" "string type" "homogeneous"\n'
+                                         'Material "hair"\nShape "curve"'), "--vpls", 10)
+        for text in ("lights of the kind projection: left out", "media: left out", 'kind hair is diffuse', "shapes of the kind curve: left out"):
+            self.assertIn(text, said)
+
+    def test_wrong_files_are_refused_with_file_and_line(self):
+        good = self.floor("LightSource \"point\"").read_text()
+        self.write("loop.pbrt", 'Include "loop.pbrt"')
+        os.mkfifo(self.folder / "pipe.pbrt")
+        for change, texts in ((("WorldBegin", "WorldBegn"), ("line 4", "WorldBegn")), (("0 1 2 0 2 3", "0 1 2 0 2 9"), ("9", "4 vertices")),
+                              (("fov\" 1", "fov\" x"), ("line 3", "\"x\"")), (("LookAt 0 4 0.001", "LookAt 0 0 0"), ("its own place",)),
+                              (("WorldBegin", 'WorldBegin Include "loop.pbrt"'), ("loop.pbrt", "without end")),
+                              (("WorldBegin", 'WorldBegin Include "pipe.pbrt"'), ("pipe.pbrt",)), (("WorldBegin", 'WorldBegin Include "none.pbrt"'), ("none.pbrt",)),
+                              (("WorldBegin", "WorldBegin AttributeEnd"), ("AttributeEnd",)), (("WorldBegin", "WorldBegin AttributeBegin"), ("no end",)),
+                              (("WorldBegin", 'WorldBegin ObjectInstance "a"'), ('"a"',)), (("\"float fov\" 1", "\"float fov\" ["), ("line 4", "WorldBegin", "finite number")),
+                              (("WorldBegin", 'WorldBegin Shape "plymesh" "string filename" "no.ply"'), ("no.ply",))):
+            with self.subTest(change):
+                self.assertIn(change[0], good)
+                self.assert_ends(lumicut("render", self.write("bad.pbrt", good.replace(*change)), "-o", self.folder / "x.exr"), BAD_FILE, *texts)
+
+
+if __name__ == "__main__":
+    unittest.main()
