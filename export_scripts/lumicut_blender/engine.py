@@ -9,7 +9,7 @@ import bpy
 
 from . import cameras, collect, export, passes, properties, runtime, shadow_catcher, sky, viewport
 from .lumicut import library
-from .report import Report
+from .report import WRONG, Report
 
 POLL_MS = 40
 SHOW_SECONDS = 0.25  # between two changes of what is shown: each redraws the window, and a window that draws hears no key
@@ -214,10 +214,10 @@ class LumicutEngine(bpy.types.RenderEngine):
         if self.is_preview:
             return
         runtime.remember(report)
-        for line in report.lines(most_names=12):
+        for (severity, _, _), line in zip(report.entries(), report.lines(most_names=12)):
             if line not in self._told:
                 self._told.add(line)
-                self.report({"INFO"}, f"Lumicut: {line}")  # printed, where there is no window
+                self.report({"WARNING" if severity == WRONG else "INFO"}, f"Lumicut: {line}")  # printed, where there is no window
 
     def _report_of(self, frame):
         """One for all view layers of a frame, which this is called for one after the other."""

@@ -350,6 +350,11 @@ class LUMICUT_PT_notes(Notes, bpy.types.Panel):
     bl_label = "Approximated"
     severities = {report.WRONG: "ERROR", report.APPROXIMATED: "INFO"}
 
+    def draw_header(self, context):
+        worst = min((entry[0] for entry in runtime.last["entries"]), default=report.NUANCE)
+        if worst in self.severities:
+            self.layout.label(text="", icon=self.severities[worst])
+
 
 class LUMICUT_PT_nuances(Notes, bpy.types.Panel):
     """What only a measurement tells."""

@@ -41,6 +41,7 @@ class Session:
         self.message, self.told = "collecting", ""
         self.cache, self.images = collect.MeshCache(), None
         self.data, self.settings, self.view = None, None, None
+        self.scene = ""          # its name
         self.levels_done = 0
         self.thread = None
         _sessions.add(self)
@@ -64,7 +65,7 @@ class Session:
             traceback.print_exc()
             self.message = f"collecting failed: {error}"
             return
-        self.data = data
+        self.data, self.scene = data, depsgraph.scene.name
         self.settings = self._settings(settings)
         self.view = None  # the next draw asks for it
         runtime.remember(report)
@@ -86,18 +87,34 @@ class Session:
             levels.append((divisor, name, values))
         final = {"passes": settings.viewport_passes, "max_seconds": settings.viewport_seconds, "target_error": settings.viewport_target_error,
                  "confidence": settings.confidence}
-        return {"levels": levels, "final": final, "denoise": settings.denoise_viewport and settings.viewport_passes > 1, "exposure": passes.exposure(settings.id_data), "tracing": properties.tracing_of(settings), "threads": settings.threads}
+        return {"levels": levels, "final": final, "denoise": settings.denoise_viewport and settings.viewport_passes > 1, "exposure": passes.exposure(settings.id_data), "tracing": properties.tracing_of(settings), "threads": settings.threads,
+                "max_shininess": settings.max_shininess}
+
+    def settings_now(self):
+        """The scene's settings, or None where they are those of the picture."""
+        scene = bpy.data.scenes.get(self.scene)
+        if scene is None or self.settings is None or not properties.tables.integrators:
+            return None
+        fresh = self._settings(scene.lumicut)
+        return fresh if fresh != self.settings else None
 
     def draw(self, engine, context, depsgraph):
         region = context.region
         width, height = region.width, region.height
         if self.data is None and not self.message.startswith("collecting failed"):
             self.update(engine, context, depsgraph)
+        changed = ()
+        fresh = self.settings_now()
+        if fresh is not None:
+            changed = {key for key, value in fresh.items() if value != self.settings[key]}
+            self.settings = fresh
+            if "max_shininess" in changed:
+                self.update(engine, context, depsgraph)  # materials are read with it
         if self.data is not None and runtime.loaded() is not None:
             camera = cameras.viewport_camera(context, width, height)
             view = (bytes(camera), width, height)
-            if view != self.view:
-                new_scene = self.view is None
+            if view != self.view or changed:
+                new_scene = self.view is None or not {"tracing", "threads"}.isdisjoint(changed)
                 self.view = view
                 self._ask(self.data if new_scene else None, camera, (width, height))
         elif runtime.loaded() is None:
@@ -258,6 +275,8 @@ def _tick():
                 session.close()
             elif fresh_sky:
                 session.data = None  # collected anew at the next draw
+                engine.tag_redraw()
+            elif session.settings_now() is not None:
                 engine.tag_redraw()
             elif session.shown != session.picture_number and session.picture is not None or session.message != session.told:
                 engine.tag_redraw()

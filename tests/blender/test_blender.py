@@ -400,10 +400,14 @@ class Interface(Blender):
         self.assertEqual(result["levels"], 3)
         # The interface's own timer went on while the worker rendered.
         self.assertGreater(result["ticks_while_rendering"], 5)
+        self.assertTrue(result["setting_followed"])
         self.assertTrue(result["object_moved"])
         self.assertTrue(result["again"])
         for name in ("panels", "render", "rendering", "viewport", "viewport_turned"):
             self.assertGreater((shots / f"{name}.png").stat().st_size, 10000, name)
+        if os.environ.get("LUMICUT_UPDATE_DOCS"):
+            for name in ("render", "viewport"):
+                subprocess.run(["convert", shots / f"{name}.png", "-resize", "1200x", "-strip", "-quality", "82", IMAGES / f"blender_{name}.jpg"], check=True)
 
 
 if __name__ == "__main__":

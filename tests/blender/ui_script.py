@@ -148,6 +148,15 @@ def steps():
     yield from until(lambda: first.shown == first.picture_number, "the finest picture on the screen")
     yield from pause(0.5)
     screenshot("viewport")
+    # Another setting: the picture follows, and the scene is not collected anew.
+    number, data = first.picture_number, first.data
+    scene.lumicut.viewport_lights = 4000
+    yield from until(lambda: first.picture_number > number + 2 and first.message == "done", "pictures of fewer lights")
+    result["setting_followed"] = first.data is data
+    scene.lumicut.viewport_lights = 5000
+    number = first.picture_number
+    yield from until(lambda: first.picture_number > number + 2 and first.message == "done", "pictures of as many lights as before")
+    number = first.picture_number
     # An object moves: pictures begin anew.
     before = first.picture.copy()
     vase = next(ob for ob in scene.objects if ob.name.startswith("vase"))
