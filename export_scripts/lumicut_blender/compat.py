@@ -14,6 +14,16 @@ except ImportError:  # private to Blender's own panels: may move
 FLAT_RECTS = bpy.app.version >= (4, 1, 0)  # pixels of passes are set as one row of numbers
 
 
+def has_denoiser():
+    """Whether the compositor's Denoise node does something: some are built without Open Image Denoise. (Cycles knows; where
+    there is no Cycles, nobody does.)"""
+    try:
+        import _cycles
+    except ImportError:
+        return True
+    return bool(getattr(_cycles, "with_openimagedenoise", True))
+
+
 def has_nodes(owner):
     """Whether a material, world or light is described by nodes: always from 5.0 on, where the switch is deprecated."""
     return bool(getattr(owner, "use_nodes", True)) and getattr(owner, "node_tree", None) is not None

@@ -5,7 +5,7 @@ import blf
 import bpy
 from bl_ui.utils import PresetPanel
 
-from . import operators, properties, report, runtime
+from . import compat, operators, properties, report, runtime
 
 ENGINE = operators.ENGINE
 PLACES = {  # parameter -> panel, label there
@@ -179,7 +179,11 @@ class LUMICUT_PT_denoise(LibraryPanel, bpy.types.Panel):
         column.prop(settings, "firefly_filter")
         if settings.passes == 1:
             wrapped(layout, "One iteration alone is not denoised", context, "INFO")
-        layout.operator("lumicut.wire_denoiser")
+        row = layout.row()
+        row.enabled = compat.has_denoiser()
+        row.operator("lumicut.wire_denoiser")
+        if not row.enabled:
+            wrapped(layout, "This Blender is built without Open Image Denoise", context, "INFO")
 
 
 class LUMICUT_PT_sampling_advanced(LibraryPanel, bpy.types.Panel):

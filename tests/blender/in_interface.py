@@ -19,9 +19,11 @@ class Recorder:
 
     def __init__(self, rows=None):
         self.__dict__["rows"] = [] if rows is None else rows
+        self.__dict__["enabled"] = True
 
     def __setattr__(self, name, value):
-        pass
+        if name == "enabled":
+            self.__dict__[name] = value
 
     def _nested(self, *_, heading="", **__):
         if heading:

@@ -366,10 +366,10 @@ class Interface(Blender):
         self.assertEqual(result["width"], 333)  # as the factory has it on a screen of 1920: labels are measured for it
 
         def sheet(name, *tabs):
-            """Screenshots side by side, without what is empty at their ends, in 48 colours."""
+            """Screenshots side by side, without what is empty at their ends, in 160 colours."""
             path = shots / name
             columns = [word for tab in tabs for word in ("(", str(shots / f"panels_{tab}.png"), "-trim", "+repage", "-bordercolor", "#303030", "-border", "4", ")")]
-            subprocess.run(["convert", "-background", "#303030", *columns, "-gravity", "north", "+append", "+dither", "-colors", "48",
+            subprocess.run(["convert", "-background", "#303030", *columns, "-gravity", "north", "+append", "+dither", "-colors", "160",
                             "-strip", f"PNG8:{path}"], check=True)
             if os.environ.get("LUMICUT_UPDATE_DOCS"):
                 shutil.copy(path, IMAGES / name)
