@@ -156,6 +156,23 @@ class LUMICUT_PT_world_light_group(LightGroup, bpy.types.Panel):
     owner = "world"
 
 
+class LUMICUT_PT_world_ray_visibility(Panel, bpy.types.Panel):
+    bl_label = "Ray Visibility"
+    bl_context = "world"
+    bl_options = {"DEFAULT_CLOSED"}
+    owner = "world"
+    rays = ("camera",)  # that are followed
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and hasattr(context.world, "cycles_visibility")  # it belongs to Cycles, and counts here too
+
+    def draw(self, context):
+        column = split(self.layout).column()
+        for ray in self.rays:
+            column.prop(context.world.cycles_visibility, ray, text=ray.capitalize())
+
+
 class MaterialOutput(Panel):
     """What leads to a socket of the material's output."""
     bl_context = "material"
@@ -278,7 +295,8 @@ class LUMICUT_PT_camera_aperture(Panel, bpy.types.Panel):
 
 
 CLASSES = (LUMICUT_PT_passes, LUMICUT_PT_light_groups, LUMICUT_PT_filter, LUMICUT_PT_override, LUMICUT_PT_object_light_group,
-           LUMICUT_PT_visibility, LUMICUT_PT_ray_visibility, LUMICUT_PT_world_light_group, LUMICUT_PT_material_volume,
+           LUMICUT_PT_visibility, LUMICUT_PT_ray_visibility, LUMICUT_PT_world_light_group, LUMICUT_PT_world_ray_visibility,
+           LUMICUT_PT_material_volume,
            LUMICUT_PT_material_displacement, LUMICUT_PT_material_viewport, LUMICUT_PT_light, LUMICUT_PT_light_nodes,
            LUMICUT_PT_beam_shape, LUMICUT_PT_camera_aperture)
 

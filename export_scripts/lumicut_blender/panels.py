@@ -13,7 +13,7 @@ PLACES = {  # parameter -> panel, label there
     "clamp_distance": ("clamping", "Distance"), "clamp_relative": ("clamping", "Relative"), "compensate": ("caustics", "Compensate"),
 }
 LABELS = {"vpls": "Lights", "virtual_lights": "Shape", "environment_vpls": "For the World", "direct_share": "For Direct Light",
-          "local_visibility": "Visibility", "representatives": "Representatives"}
+          "local_visibility": "Visibility", "coarse_separation": "Coarse Limit"}
 NAMES_SHOWN = 8  # of one note
 
 
@@ -45,10 +45,10 @@ def split(layout):
 
 def wrapped(layout, text, context=None, icon="NONE", width=0):
     """Text in lines as wide as the region, or as `width` points."""
-    scale = bpy.context.preferences.system.ui_scale
+    scale = bpy.context.preferences.system.ui_scale or 1.0  # 0 without a window
     if not width:
         region = (context or bpy.context).region
-        width = region.width / scale - 65 if region is not None else 280
+        width = region.width / scale - 65 if region is not None else 230
     if icon != "NONE":
         width -= 20
     blf.size(0, 11 * scale)
@@ -250,8 +250,9 @@ class LUMICUT_PT_lights(LibraryPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        layout, settings = split(self.layout), context.scene.lumicut
-        layout.prop(settings, "integrator")
+        settings = context.scene.lumicut
+        self.layout.prop(settings, "integrator", text="")  # their names are long
+        layout = split(self.layout.column())
         if lit_by_virtual_lights(settings):
             draw_own_parameters(layout.column(align=True), settings)
         draw_parameters(layout.column(align=True), settings, None)

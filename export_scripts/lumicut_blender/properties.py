@@ -252,7 +252,7 @@ def register():
     if tables.integrators:
         annotations["integrator"] = EnumProperty(
             name="Integrator", description="How the virtual lights are summed",
-            items=[(row.id, row.label, f"{row.description}. {row.source}") for row in tables.integrators],
+            items=[(row.id, title_case(row.label), f"{row.description}. {row.source}") for row in tables.integrators],
             default=preset)
     for group, parameters in tables.groups():
         defaults = suggested if group in {COMMON, preset} else {}

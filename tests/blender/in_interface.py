@@ -36,6 +36,8 @@ class Recorder:
         found = owner.bl_rna.properties[name]  # a KeyError is a panel that asks for what is not there
         kind = "toggle" if found.type == "BOOLEAN" else "prop"
         self.rows.append((kind, found.name if text is None else text, found.description))
+        if found.type == "ENUM" and owner.bl_rna.identifier.startswith("Lumicut"):
+            self.rows += [("value" if text != "" else "wide value", item.name, item.description) for item in found.enum_items]
 
     def prop_search(self, owner, name, *_, text=None, **__):
         self.prop(owner, name, text)
@@ -79,7 +81,7 @@ def drawn(**more):
         if not cls.poll(where):
             continue
         recorder = Recorder()
-        values = {name: getattr(cls, name, None) for name in ("bl_label", "owner", "suffix", "severities", "hint")}
+        values = {name: getattr(cls, name, None) for name in ("bl_label", "owner", "suffix", "severities", "hint", "rays")}
         for function in functions:
             function(types.SimpleNamespace(layout=recorder, **values), where)
         found[cls.__name__] = recorder.rows
@@ -113,8 +115,9 @@ def wide_contexts():
 
 
 # Points of text that the factory's Properties editor (333 of 1920 pixels) has room for, measured there: beside a value in
-# a panel inside another, on a checkbox, on a button or a line of its own.
-LABEL, CHECKBOX, LINE = 96, 150, 235
+# a panel inside another, on a checkbox, on a button or a line of its own,
+# of a menu beside its label.
+LABEL, CHECKBOX, LINE, VALUE = 96, 150, 235, 118
 
 
 class Layout(unittest.TestCase):
@@ -138,9 +141,10 @@ class Layout(unittest.TestCase):
 
     def test_no_label_is_cut_off_at_the_default_width(self):
         import blf
-        blf.size(0, 11)
-        room = {"prop": LABEL, "toggle": CHECKBOX, "heading": LABEL}
-        wide = {(name, kind, text, blf.dimensions(0, text)[0]) for name, kind, text, _ in self.rows()
+        rows = list(self.rows())
+        blf.size(0, 11)  # after the panels, which measure too
+        room = {"prop": LABEL, "toggle": CHECKBOX, "heading": LABEL, "value": VALUE}
+        wide = {(name, kind, text, blf.dimensions(0, text)[0]) for name, kind, text, _ in rows
                 if blf.dimensions(0, text)[0] > room.get(kind, LINE)}
         self.assertFalse(wide)
         for cls, _ in own_panels():
