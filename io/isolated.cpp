@@ -43,7 +43,7 @@ void limit(__rlimit_resource_t what, rlim_t most) {
   for (const int signal : {SIGINT, SIGTERM, SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL}) std::signal(signal, SIG_DFL);
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_CPU, static_cast<rlim_t>(std::ceil(seconds)));
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#ifndef LUMICUT_SANITIZED
   limit(RLIMIT_AS, physical_memory());  // sanitizers reserve more
 #endif
   // Libraries talk; their words are not this program's.

@@ -56,6 +56,9 @@ class Reader {
       for (Material& material : model_.scene.materials) material.values = default_material();
     for (unsigned i = 0; i < assimp_->mNumMeshes; ++i) read_mesh(*assimp_->mMeshes[i], i);
     Affine root;
+    aiString generator;
+    if (assimp_->mMetaData != nullptr && assimp_->mMetaData->Get("SourceAsset_Generator", generator))
+      of_blender_ = ending_ == ".fbx" && std::string(generator.C_Str()).find("Blender") != std::string::npos;
     if (ending_ == ".fbx") {  // centimetres a unit
       double unit = 1;
       float single = 1;
@@ -290,7 +293,11 @@ class Reader {
     lumicut_light light{};
     light.struct_size = sizeof(light);
     light.unit = LUMICUT_WATT, light.value = 1;
-    store_colour(light.color, from.mColorDiffuse, 1e15);
+    aiColor3D colour = from.mColorDiffuse;
+    // Blender leaves a white lamp's colour out, and where there is a camera too its file says that 0.8 is then meant.
+    if (of_blender_ && assimp_->mNumCameras > 0 && colour.r == colour.g && colour.g == colour.b)
+      colour = colour * (1 / 0.8f);
+    store_colour(light.color, colour, 1e15);
     store(light.position, world.point(vec(from.mPosition)));
     store(light.direction, unit(world.vector(vec(from.mDirection))));
     switch (from.mType) {
@@ -308,7 +315,7 @@ class Reader {
           return;
         }
         light.angle = static_cast<float>(outer);
-        light.blend = static_cast<float>(1 - inner / outer * (inner / outer));  // as Blender writes it
+        light.blend = static_cast<float>(1 - inner / outer);
         break;
       }
       case aiLightSource_AMBIENT:
@@ -330,6 +337,7 @@ class Reader {
   const aiScene* assimp_ = nullptr;
   Model model_;
   size_t nodes_ = 0;
+  bool of_blender_ = false;
 };
 
 class Module final : public ModelModule {

@@ -162,8 +162,9 @@ PaintRef power_paint(PaintRef base, double exponent) {
 
 std::optional<Vec> constant_of(const PaintRef& paint) {
   const auto both = [&](auto&& combine) -> std::optional<Vec> {
-    const auto a = constant_of(paint->a), b = constant_of(paint->b);
-    if (!a || !b) return std::nullopt;
+    const auto a = constant_of(paint->a);
+    const auto b = a ? constant_of(paint->b) : std::nullopt;
+    if (!b) return std::nullopt;
     Vec out;
     for (size_t k = 0; k < 3; ++k) out[k] = combine((*a)[k], (*b)[k]);
     return out;
@@ -284,6 +285,15 @@ void SceneBuilder::leave_out(const std::string& what) {
 }
 void SceneBuilder::approximate(const std::string& what) {
   if (told_.insert(what).second) scene.warnings.add("things approximated", path_, shown(what));
+}
+
+PaintRef SceneBuilder::made(Paint paint) const {
+  for (const PaintRef* part : {&paint.a, &paint.b, &paint.share})
+    if (*part) paint.size += (*part)->size;
+  if (paint.size > 500) fail("", "a texture is made of more than 500 others");
+  auto out = std::make_shared<const Paint>(std::move(paint));
+  if (const auto value = constant_of(out)) return constant_paint(*value);
+  return out;
 }
 
 int32_t SceneBuilder::image(const std::string& name, TextureUse use, uint32_t flags) {

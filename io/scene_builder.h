@@ -52,6 +52,7 @@ struct Paint {
   int32_t texture = 0;          // image
   double uv[4] = {1, 1, 0, 0};  // image, checker: scale and offset of u, v
   PaintRef a, b, share;         // checker, product, mix: a where share is 0
+  size_t size = 1;              // with all that it is made of
 };
 PaintRef constant_paint(const Vec& value);
 PaintRef constant_paint(double value);
@@ -85,6 +86,9 @@ class SceneBuilder {
   int32_t image(const std::string& name, TextureUse use, uint32_t flags);
   TextureStore& textures() { return textures_; }
   const std::string& path() const { return path_; }
+
+  // What is made of others: a constant where they are, and never of more than 500.
+  PaintRef made(Paint paint) const;
 
   // A colour of a material: factor and texture. Values are cut to [0, most].
   void set_colour(const PaintRef& paint, float* factor, int32_t& texture, double most = 1);

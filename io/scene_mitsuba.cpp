@@ -295,14 +295,14 @@ class Reader {
     const auto known = paints_.find(key);
     if (known != paints_.end()) return known->second;
     if (++depth_ > kDeepest) fail(node, "textures lie in each other without end");
-    auto out = std::make_shared<Paint>();
-    PaintRef result = out;
+    Paint out;
+    PaintRef result;
     const std::string kind = text(node, "type");
     if (const Node to_uv = child(node, "to_uv")) {
       const Affine m = transform(to_uv);
       if (m.m[1] != 0 || m.m[4] != 0) build_.approximate("turned textures are not turned");
       // In coordinates whose v counts from below.
-      out->uv[0] = m.m[0], out->uv[1] = m.m[5], out->uv[2] = m.m[3], out->uv[3] = 1 - m.m[5] - m.m[7];
+      out.uv[0] = m.m[0], out.uv[1] = m.m[5], out.uv[2] = m.m[3], out.uv[3] = 1 - m.m[5] - m.m[7];
     }
     if (kind == "bitmap") {
       const std::string wrap = word(node, "wrap_mode", "repeat");
@@ -310,14 +310,15 @@ class Reader {
       if (wrap == "mirror") build_.approximate("mirrored textures repeat");
       if (word(node, "filter_type", "bilinear") == "nearest") flags |= LUMICUT_NEAREST;
       const bool raw = numbers_alone || truth(node, "raw", false);
-      out->kind = Paint::Kind::image;
-      out->texture = build_.image(word(node, "filename", ""), raw ? TextureUse::numbers : TextureUse::colour, flags);
-      if (out->texture == 0) result = constant_paint(0.5);
+      out.kind = Paint::Kind::image;
+      out.texture = build_.image(word(node, "filename", ""), raw ? TextureUse::numbers : TextureUse::colour, flags);
+      result = out.texture != 0 ? build_.made(out) : constant_paint(0.5);
     } else if (kind == "checkerboard") {
-      out->kind = Paint::Kind::checker;
-      out->a = paint(node, "color0", 0.4), out->b = paint(node, "color1", 0.2);
+      out.kind = Paint::Kind::checker;
+      out.a = paint(node, "color0", 0.4), out.b = paint(node, "color1", 0.2);
       // Two squares a unit; the first lies where u and v are 0, which is above.
-      for (double& x : out->uv) x *= 2;
+      for (double& x : out.uv) x *= 2;
+      result = build_.made(out);
     } else {
       build_.approximate(fmt::format("textures of the kind {} are grey", kind));
       result = constant_paint(0.5);

@@ -535,21 +535,24 @@ class Reader {
   }
 
   void texture(const std::string& name, const std::string& kind, const Parameters& p) {
-    auto out = std::make_shared<Paint>();
-    out->uv[0] = p.number("uscale", 1), out->uv[1] = p.number("vscale", 1);
-    out->uv[2] = p.number("udelta", 0), out->uv[3] = p.number("vdelta", 0);
+    Paint out;
+    out.uv[0] = p.number("uscale", 1), out.uv[1] = p.number("vscale", 1);
+    out.uv[2] = p.number("udelta", 0), out.uv[3] = p.number("vdelta", 0);
     if (p.word("mapping", "uv") != "uv")
       build_.approximate(fmt::format("textures mapped {} are taken as by uv", p.word("mapping", "uv")));
-    PaintRef result = out;
+    PaintRef result;
     if (kind == "constant") {
       result = paint(p, "value", 1);
     } else if (kind == "scale") {
-      out->kind = Paint::Kind::product, out->a = paint(p, "tex", 1), out->b = paint(p, "scale", 1);
+      out.kind = Paint::Kind::product, out.a = paint(p, "tex", 1), out.b = paint(p, "scale", 1);
+      result = build_.made(out);
     } else if (kind == "mix") {
-      out->kind = Paint::Kind::mix, out->a = paint(p, "tex1", 0), out->b = paint(p, "tex2", 1),
-      out->share = paint(p, "amount", 0.5);
+      out.kind = Paint::Kind::mix, out.a = paint(p, "tex1", 0), out.b = paint(p, "tex2", 1),
+      out.share = paint(p, "amount", 0.5);
+      result = build_.made(out);
     } else if (kind == "checkerboard" && p.number("dimension", 2) == 2) {
-      out->kind = Paint::Kind::checker, out->a = paint(p, "tex1", 1), out->b = paint(p, "tex2", 0);
+      out.kind = Paint::Kind::checker, out.a = paint(p, "tex1", 1), out.b = paint(p, "tex2", 0);
+      result = build_.made(out);
     } else if (kind == "imagemap") {
       const std::string encoding = p.word("encoding", "sRGB"), wrap = p.word("wrap", "repeat");
       if (encoding != "sRGB" && encoding != "linear")
@@ -557,17 +560,18 @@ class Reader {
       uint32_t flags = wrap == "clamp" ? uint32_t{LUMICUT_CLAMP} : 0u;
       if (wrap != "clamp" && wrap != "repeat") build_.approximate(fmt::format("textures wrapped \"{}\" repeat", wrap));
       if (p.word("filter", "bilinear") == "point") flags |= LUMICUT_NEAREST;
-      out->kind = Paint::Kind::image;
-      out->texture =
+      out.kind = Paint::Kind::image;
+      out.texture =
           build_.image(p.word("filename", ""), encoding == "linear" ? TextureUse::numbers : TextureUse::colour, flags);
-      if (out->texture == 0) {
+      if (out.texture == 0) {
         result = constant_paint(0.5);
       } else {
+        result = build_.made(out);
         if (const double scale = p.number("scale", 1); scale != 1) result = product(result, constant_paint(scale));
         if (p.truth("invert", false)) {
-          auto inverted = std::make_shared<Paint>();
-          inverted->kind = Paint::Kind::invert, inverted->a = result;
-          result = inverted;
+          Paint inverted;
+          inverted.kind = Paint::Kind::invert, inverted.a = result;
+          result = build_.made(inverted);
         }
       }
     } else {
@@ -576,10 +580,10 @@ class Reader {
     }
     textures_[name] = result;
   }
-  static PaintRef product(const PaintRef& a, const PaintRef& b) {
-    auto out = std::make_shared<Paint>();
-    out->kind = Paint::Kind::product, out->a = a, out->b = b;
-    return out;
+  PaintRef product(const PaintRef& a, const PaintRef& b) const {
+    Paint out;
+    out.kind = Paint::Kind::product, out.a = a, out.b = b;
+    return build_.made(out);
   }
 
   // ---- Materials

@@ -38,6 +38,8 @@ inside "apt-get -qq update"
 
 step "the command renders"
 install ./liblumicut1_*.deb ./lumicut_*.deb
+printf 'ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n' > "$tree/work/a.ply"
+inside "lumicut render a.ply --vpls 10 --size 4x4 -o ply.exr -q"  # assimp's module and what it needs
 inside "lumicut render cornell_box/cornell_box.json --vpls 500 --size 48x36 -o box.exr --png box.png -q && ls -l box.exr box.png"
 inside "for page in '' -render -report; do test -s /usr/share/man/man1/lumicut\$page.1.gz || grep -q 'path-exclude.*man' /etc/dpkg/dpkg.cfg.d/*; done"
 inside "bash -c '. /usr/share/bash-completion/completions/lumicut
