@@ -97,11 +97,20 @@ class LUMICUT_PT_sampling_presets(PresetPanel, bpy.types.Panel):
         layout = self.layout
         layout.emboss = "PULLDOWN_MENU"
         if properties.tables.integrators:
-            active = properties.active_preset(context.scene.lumicut)
+            active, column = properties.active_preset(context.scene.lumicut), layout.column(align=True)
             for key, preset in properties.PRESETS.items():
-                layout.operator("lumicut.preset", text=preset[0], icon="CHECKMARK" if key == active else "BLANK1").preset = key
+                row = column.row(align=True)
+                row.alignment = "LEFT"
+                row.operator("lumicut.preset", text=preset[0], icon="CHECKMARK" if key == active else "BLANK1").preset = key
             layout.separator()
-        PresetPanel.draw(self, context)
+        if bpy.utils.preset_paths(self.preset_subdir):
+            PresetPanel.draw(self, context)
+            return
+        row = layout.row(align=True)  # none of the user's yet: Blender's own list would say that paths are missing
+        name = row.row()
+        name.emboss = "NORMAL"
+        name.prop(context.window_manager, "preset_name", text="")
+        row.operator(self.preset_add_operator, text="", icon="ADD").name = context.window_manager.preset_name
 
 
 class LUMICUT_PT_sampling(Panel, bpy.types.Panel):
