@@ -3,7 +3,7 @@
 
     bench/importance.py -o FOLDER [--lumicut build/release/bin/lumicut] [--passes 8 32] [SCENE ...]
 
-Without scenes it makes the building of 40 rooms and one room of it (bench/office.py). Times are CPU seconds of the whole
+Without scenes it makes the building of 40 rooms, the same with point lamps, and one room of it (bench/office.py). Times are CPU seconds of the whole
 process with one thread, errors RMSE over the mean against many compensated passes of another seed (made once and kept in
 the folder). The last column is what the same error costs without, over what it costs with importance: errors fall with
 the root of passes, so that each table row stands for RMSE² times seconds.
@@ -40,7 +40,7 @@ def main():
         return image, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
     if not options.scenes:
-        for name, arguments in (("office", []), ("room", ["--rows", "1", "--columns", "1"])):
+        for name, arguments in (("office", []), ("point_lamps", ["--lamps", "point"]), ("room", ["--rows", "1", "--columns", "1"])):
             scene = os.path.join(options.output, name + ".json")
             subprocess.run([sys.executable, os.path.join(BENCH, "office.py"), *arguments, "-o", scene], check=True)
             options.scenes.append(scene)

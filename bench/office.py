@@ -2,6 +2,7 @@
 """An office building as a scene file: rooms along corridors, ten lamps in each, the camera in one of them.
 
     bench/office.py -o office.json                        40 rooms, 400 lamps
+    bench/office.py --lamps point -o points.json          its ceiling lamps are points
     bench/office.py --rows 1 --columns 1 -o room.json     one room of it, with what the camera sees of its corridor
 
 Rooms are 4 m wide, 5 m deep and 2.8 m high. Two rows of rooms share a corridor, to which each has an open door. Eight
@@ -17,7 +18,8 @@ DOOR_LEFT, DOOR_WIDTH, DOOR_HEIGHT = 0.6, 1.0, 2.1
 
 
 class Building:
-    def __init__(self):
+    def __init__(self, lamps):
+        self.lamps = lamps  # the kind of those on the ceiling
         self.parts = {}  # material → (positions, quads)
         self.lights = []
 
@@ -61,8 +63,12 @@ class Building:
         box("wood", (WIDTH - 0.45, 0.6, 0), (WIDTH - 0.02, 2.2, 1.1 + rng.random()))
         for i in range(2):
             for j in range(4):
-                self.lights.append({"type": "rectangle", "position": [x + 1.2 + 1.6 * i, corridor + away * (0.8 + 1.15 * j), HEIGHT - 0.06],
-                                    "u": [0.0, 0.15, 0.0], "v": [1.0, 0.0, 0.0], "value": 14.0})
+                lamp = {"type": self.lamps, "position": [x + 1.2 + 1.6 * i, corridor + away * (0.8 + 1.15 * j), HEIGHT - 0.06]}
+                if self.lamps == "rectangle":
+                    lamp |= {"u": [0.0, 0.15, 0.0], "v": [1.0, 0.0, 0.0], "value": 14.0}
+                else:
+                    lamp |= {"value": 1.0}
+                self.lights.append(lamp)
 
     def corridor(self, length, y):
         self.box("lino", (-WALL, y - DEPTH - WALL - CORRIDOR / 2, -0.1), (length + WALL, y + DEPTH + WALL + CORRIDOR / 2, 0))
@@ -89,11 +95,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rows", type=int, default=4, help="rows of rooms, two to a corridor")
     parser.add_argument("--columns", type=int, default=10, help="rooms in a row")
+    parser.add_argument("--lamps", choices=("rectangle", "point"), default="rectangle", help="on the ceiling")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("-o", "--output", required=True)
     options = parser.parse_args()
     rng = random.Random(options.seed)
-    building = Building()
+    building = Building(options.lamps)
     pitch = 2 * (DEPTH + WALL) + CORRIDOR
     for pair in range((options.rows + 1) // 2):
         y = pair * pitch

@@ -149,8 +149,7 @@ CameraImportance::CameraImportance(const Scene& scene, const LightSampler& emitt
   const std::vector<CameraPoint> points = trace_camera_paths(scene, frame, options.seed, progress);
   const auto groups = EmitterGroups(emitters, progress).take();
   weigh_path_starts(scene, emitters, options, groups, progress);
-  weigh_direct(scene, emitters, options.seed, points, groups, progress);
-  progress.check();
+  weigh_direct(emitters, root_mean_squares(scene, emitters, options.seed, points, groups, progress));
 }
 
 std::vector<CameraImportance::CameraPoint> CameraImportance::trace_camera_paths(const Scene& scene, FrameSize frame,
@@ -269,7 +268,7 @@ void CameraImportance::weigh_path_starts(const Scene& scene, const LightSampler&
 namespace {
 
 // What a virtual light gives to a point of the camera, shadow aside, and the ray that looks for that.
-double given_to(const SurfacePoint& point, const DirectSample& s, Ray& shadow) {
+double given_to(const SurfacePoint& point, const DirectSample& s, const Falloff& profiles, Ray& shadow) {
   shadow.org = point.position, shadow.tnear = 0.0f, shadow.mask = kShadowRay;
   Vec3f towards = -s.vpl.normal;
   float falloff = 1.0f;
@@ -280,10 +279,10 @@ double given_to(const SurfacePoint& point, const DirectSample& s, Ray& shadow) {
     const float d2 = length2(to);
     if (!(d2 > 0.0f)) return 0.0;
     towards = to / std::sqrt(d2);
-    const float cosine = -dot(s.vpl.normal, towards);
     // As if it were no nearer than it is wide: what is nearer is sampled otherwise [near_lights.h].
-    const auto area = static_cast<float>(1.0 / s.density);
-    falloff = (s.vpl.kind == VplKind::spot ? spot_falloff(s.vpl, cosine) : std::max(0.0f, cosine)) / (d2 + area);
+    falloff = 1.0f / (d2 + (s.density > 0.0 ? static_cast<float>(1.0 / s.density) : 0.0f));
+    if (s.vpl.kind == VplKind::spot) falloff *= profiles.of_spot(s.vpl, -towards);
+    if (s.vpl.kind == VplKind::oriented) falloff *= std::max(0.0f, -dot(s.vpl.normal, towards));
   }
   const float cosine = dot(point.normal, towards);
   if (!(cosine > 0.0f) || !(falloff > 0.0f)) return 0.0;
@@ -294,17 +293,21 @@ double given_to(const SurfacePoint& point, const DirectSample& s, Ray& shadow) {
 }  // namespace
 
 // Root of the mean square over points of the camera, shadows included: lights by that make the least error in all.
-void CameraImportance::weigh_direct(const Scene& scene, const LightSampler& emitters, uint64_t seed,
-                                    const std::vector<CameraPoint>& points,
-                                    const std::vector<std::vector<uint32_t>>& groups, Progress& progress) {
-  if (!emitters.has_extended()) return;
+std::vector<double> CameraImportance::root_mean_squares(const Scene& scene, const LightSampler& emitters, uint64_t seed,
+                                                        const std::vector<CameraPoint>& points,
+                                                        const std::vector<std::vector<uint32_t>>& groups,
+                                                        Progress& progress) {
   const size_t first = emitters.emitter_count() - emitters.extended_count();
-  std::vector<double> learned(emitters.extended_count());
-  const size_t tried = std::clamp<size_t>((size_t{1} << 18) / groups.size(), 64, 1024);
+  std::vector<double> learned(emitters.emitter_count());
+  std::vector<uint32_t> delta(first, kNoId);
+  for (uint32_t d = 0; d < emitters.delta_emitters().size(); ++d)
+    if (const uint32_t e = emitters.delta_emitters()[d]; e != kNoId) delta[e] = d;
+  const Falloff profiles(scene.profiles());
+  const size_t tried = std::clamp<size_t>((size_t{1} << 18) / std::max<size_t>(1, groups.size()), 64, 1024);
   parallel_chunks(groups.size(), 4, [&](size_t begin, size_t end) {
     if (progress.cancelled() || points.empty()) return;
     for (size_t g = begin; g < end; ++g) {
-      if (groups[g][0] < first) continue;
+      if (groups[g][0] < first && delta[groups[g][0]] == kNoId) continue;  // the environment
       Rng rng(seed, Stage::importance, g, 1);
       std::vector<double> weights;
       for (const uint32_t e : groups[g]) weights.push_back(emitters.power_of(e));
@@ -314,8 +317,11 @@ void CameraImportance::weigh_direct(const Scene& scene, const LightSampler& emit
       for (size_t k = 0; k < tried; ++k) {
         const auto& [point, weight] = points[rng.next_below(static_cast<uint32_t>(points.size()))];
         const size_t member = choice.sample(static_cast<double>(rng.next_float()));
-        const DirectSample s = emitters.sample_extended(groups[g][member] - first, rng);
-        const double given = static_cast<double>(weight) * given_to(point, s, shadows[k]) / choice.pmf(member);
+        const uint32_t e = groups[g][member];
+        const DirectSample s =
+            e < first ? DirectSample{emitters.delta_lights()[delta[e]]} : emitters.sample_extended(e - first, rng);
+        const double given =
+            static_cast<double>(weight) * given_to(point, s, profiles, shadows[k]) / choice.pmf(member);
         squares[k] = given * given;
       }
       const DiscreteDistribution likely(squares);
@@ -329,11 +335,26 @@ void CameraImportance::weigh_direct(const Scene& scene, const LightSampler& emit
           std::count_if(traced.begin(), traced.end(), [](const Ray& r) { return !(r.tfar < 0.0f); }));
       const double rms =
           std::sqrt(likely.total() / static_cast<double>(tried) * open / static_cast<double>(kShadowRays));
-      for (size_t k = 0; k < groups[g].size(); ++k) learned[groups[g][k] - first] = rms * choice.pmf(k);
+      for (size_t k = 0; k < groups[g].size(); ++k) learned[groups[g][k]] = rms * choice.pmf(k);
     }
   });
   progress.check();
-  direct_ = mixed(emitters, first, learned);
+  return learned;
+}
+
+void CameraImportance::weigh_direct(const LightSampler& emitters, const std::vector<double>& learned) {
+  const size_t first = emitters.emitter_count() - emitters.extended_count();
+  if (emitters.has_extended())
+    direct_ = mixed(emitters, first, {learned.begin() + static_cast<std::ptrdiff_t>(first), learned.end()});
+  // A light that gives r, kept by r over a share of the sum of all, adds that share · sum · r of variance at most.
+  const std::vector<uint32_t>& deltas = emitters.delta_emitters();
+  keep_delta_.assign(deltas.size(), 1.0f);
+  double sum = 0.0;
+  for (const uint32_t e : deltas) sum += e != kNoId ? learned[e] : 0.0;
+  if (static_cast<double>(deltas.size()) * kDeltaVariance <= 1.0 || !(sum > 0.0)) return;
+  for (size_t d = 0; d < deltas.size(); ++d)
+    if (deltas[d] != kNoId)
+      keep_delta_[d] = std::clamp(static_cast<float>(learned[deltas[d]] / (kDeltaVariance * sum)), kLeastChance, 1.0f);
 }
 
 }  // namespace lumicut

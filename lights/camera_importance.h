@@ -28,6 +28,9 @@ class CameraImportance {
  public:
   // No light is kept with a smaller chance, and so none weighs more than one over it.
   static constexpr float kLeastChance = 1.0f / 32.0f;
+  // What chance takes of the light of lights without extent has a variance of at most this share of its square; where
+  // there are at most as many as one over it, all are kept.
+  static constexpr double kDeltaVariance = 1.0 / 256.0;
   // Emitters are chosen by power for this share of all choices.
   static constexpr double kByPower = 0.125;
 
@@ -44,6 +47,8 @@ class CameraImportance {
   double lights_of_path() const { return lights_of_path_; }
   // Chances of emitters with extent to have a virtual light for their direct light.
   const DiscreteDistribution& direct() const { return direct_; }
+  // Chance with which each of LightSampler::delta_lights() is kept.
+  const std::vector<float>& keep_delta() const { return keep_delta_; }
 
  private:
   static constexpr size_t kNeighbours = 12;
@@ -61,9 +66,11 @@ class CameraImportance {
   std::vector<CameraPoint> trace_camera_paths(const Scene& scene, FrameSize frame, uint64_t seed, Progress& progress);
   void weigh_path_starts(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
                          const std::vector<std::vector<uint32_t>>& groups, Progress& progress);
-  void weigh_direct(const Scene& scene, const LightSampler& emitters, uint64_t seed,
-                    const std::vector<CameraPoint>& points, const std::vector<std::vector<uint32_t>>& groups,
-                    Progress& progress);
+  // What each emitter gives directly.
+  static std::vector<double> root_mean_squares(const Scene& scene, const LightSampler& emitters, uint64_t seed,
+                                               const std::vector<CameraPoint>& points,
+                                               const std::vector<std::vector<uint32_t>>& groups, Progress& progress);
+  void weigh_direct(const LightSampler& emitters, const std::vector<double>& learned);
   // Contribution of a light at the place, for each unit of its intensity, up to a factor that is the same everywhere.
   float density(const Vec3f& position, const Vec3f& normal, BallQueryTree::Scratch& scratch) const;
 
@@ -71,6 +78,7 @@ class CameraImportance {
   float typical_ = 0.0f;  // density at lights that matter; 0: none was found, and all are kept
   double lights_of_path_ = 0.0;
   DiscreteDistribution path_starts_, direct_;
+  std::vector<float> keep_delta_;
 };
 
 }  // namespace lumicut

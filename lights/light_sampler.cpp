@@ -38,8 +38,10 @@ void LightSampler::add_lights(std::vector<double>& weights, const Progress* prog
       environment_share_ = power;  // until the others' power is known
       extended_ = sampler_.size();
     }
+    bool added = false;
     const auto add = [&](Kind kind, uint32_t light, double power, bool extent) {
-      if (!(power > 0.0) || extent != extended) return;
+      added = power > 0.0 && extent == extended;
+      if (!added) return;
       sampler_.push_back({kind, light, 0, 0});
       weights.push_back(power);
     };
@@ -52,7 +54,8 @@ void LightSampler::add_lights(std::vector<double>& weights, const Progress* prog
       v.group = l.group;
       v.intensity = l.value;
       const auto stands = [&](const Vpl& vpl) {
-        if (!extended) delta_.push_back(vpl);
+        if (extended) return;
+        delta_.push_back(vpl), delta_emitter_.push_back(added ? static_cast<uint32_t>(sampler_.size() - 1) : kNoId);
       };
       switch (l.type) {
         case LightType::point:

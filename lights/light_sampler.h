@@ -59,6 +59,8 @@ class LightSampler {
 
   // Lights without extent: one VPL each, exactly.
   const std::vector<Vpl>& delta_lights() const { return delta_; }
+  // Which of all emitters each of them is (emitter_count()); kNoId: it has no power.
+  const std::vector<uint32_t>& delta_emitters() const { return delta_emitter_; }
   // True where some emitter beside the environment has extent, and so needs many VPLs for its direct light.
   bool has_extended() const { return extended_ < sampler_.size(); }
   // Those emitters by number; what they are, empty for suns; and how large a part of the surface (m², one side) each of
@@ -153,6 +155,7 @@ class LightSampler {
   bool has_meshes_ = false;
   DiscreteDistribution power_;
   std::vector<Vpl> delta_;
+  std::vector<uint32_t> delta_emitter_;
   // Environment: density over texels, rows weighted by the sine of the polar angle.
   DiscreteDistribution texels_;
   // Mean luminance that a triangle with a texture emits, by mesh; empty for meshes without.

@@ -39,6 +39,17 @@ void trace_indirect(const Scene& scene, const LightSampler& emitters, const VplO
   set.light_paths = paths;
 }
 
+std::vector<Vpl> kept_delta_lights(const LightSampler& emitters, const CameraImportance& importance, uint64_t seed) {
+  std::vector<Vpl> kept;
+  for (size_t i = 0; i < emitters.delta_lights().size(); ++i) {
+    const float keep = importance.keep_delta()[i];
+    if (!(Rng(seed, Stage::importance, i, 2).next_float() < keep)) continue;
+    kept.push_back(emitters.delta_lights()[i]);
+    kept.back().intensity *= 1.0f / keep;
+  }
+  return kept;
+}
+
 // Of the triangle just below a place.
 float offset_on_surface(const Scene& scene, const Vec3f& position, const Vec3f& normal) {
   constexpr float kNear = 1e-3f;  // of the typical radius: a host's lights may lie a little off
@@ -61,7 +72,10 @@ VplSet trace_vpls(const Scene& scene, const LightSampler& emitters, const VplOpt
   VplSet set;
   set.profiles = scene.profiles();
   if (emitters.empty()) return set;
-  set.lights = emitters.delta_lights();
+  if (importance == nullptr)
+    set.lights = emitters.delta_lights();
+  else
+    set.lights = kept_delta_lights(emitters, *importance, options.seed);
   const uint64_t budget = options.count > set.lights.size() ? options.count - set.lights.size() : 0;
   if (emitters.has_extended() || emitters.has_environment()) {
     const double share = options.max_depth > 0 ? options.direct_share : 1.0;

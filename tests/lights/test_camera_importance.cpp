@@ -137,6 +137,44 @@ TEST(CameraImportance, WeightsAreBounded) {
   }
 }
 
+// A thousand point lights, two hundred and fifty in each room, and spots among them.
+TEST(CameraImportance, OfManyLampsFewAreKeptAndTheirMeanStays) {
+  const auto scene = four_rooms();
+  std::vector<Light> lamps;
+  Rng rng(1, Stage::test);
+  for (int i = 0; i < 1000; ++i) {
+    Light lamp;
+    lamp.position = test::random_point(rng, 0.9f);
+    lamp.position.x += 2.1f * static_cast<float>(i % 4), lamp.position.z = 0.9f;
+    lamp.value = {0.1f, 0.1f, 0.1f};
+    if (i % 3 == 0) lamp.type = LightType::spot, lamp.direction = {0, 0, -1}, lamp.cos_outer = 0.3f;
+    lamps.push_back(lamp);
+  }
+  scene->set_lights(lamps);
+  Progress progress;
+  scene->commit(progress);
+  Importance pilot(*scene);
+  constexpr auto kSeeds = static_cast<int>(test::trimmed(2000));
+  std::array<Moments, 4> flux;
+  double kept = 0.0, here = 0.0;
+  for (int seed = 1; seed <= kSeeds; ++seed) {
+    const VplSet set = trace_vpls(*scene, pilot.emitters, {.count = 1, .seed = static_cast<uint64_t>(seed)},
+                                  &pilot.importance, pilot.progress);
+    std::array<double, 4> sums{};
+    for (size_t i = 0; i < set.lights.size(); ++i) {
+      const Vpl& v = set.lights[i];
+      if (v.kind == VplKind::oriented) continue;  // the lamps on emissive meshes
+      sums[room_of(v.position)] += static_cast<double>(luminance(v.intensity));
+      kept += 1.0, here += room_of(v.position) == 0 ? 1.0 : 0.0;
+    }
+    for (size_t k = 0; k < 4; ++k) flux[k].add(sums[k]);
+  }
+  for (size_t k = 0; k < 4; ++k)
+    EXPECT_NEAR(flux[k].mean(kSeeds), 25.0, 4.0 * std::sqrt(flux[k].variance_of_mean(kSeeds)) + 1e-4) << k;
+  EXPECT_LT(kept / kSeeds, 400.0);
+  EXPECT_GT(here / kept, 0.7);
+}
+
 TEST(CameraImportance, IsTheSameOnAnyNumberOfThreads) {
   const auto scene = four_rooms();
   const auto lights = [&](int threads) {
