@@ -57,6 +57,10 @@ ParamTable common_params() {
           "compensate", "Compensate",
           "Rays bring back the light that the clamp takes away, and what glossy surfaces throw on others: no energy is "
           "lost, at the price of noise that passes average out")),
+      of_virtual_lights(flag<&P::trace_gloss>(
+          "trace_gloss", "Trace gloss",
+          "With Compensate: what surfaces of little roughness mirror of bounced light is found by rays instead of "
+          "virtual lights, the more the smoother they are: fine noise in place of blots on worktops and floors")),
       of_virtual_lights(flag<&P::importance>(
           "importance", "Importance",
           "Virtual lights are put where the camera sees their light, and few elsewhere: for buildings of many rooms, "

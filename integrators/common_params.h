@@ -23,6 +23,7 @@ struct CommonParams {
   float sphere_scale = 1.0f;  // of the distance to the tenth nearest
   bool compensate = false;
   bool importance = false;
+  bool trace_gloss = false;  // where compensated
   bool operator==(const CommonParams&) const = default;
 };
 

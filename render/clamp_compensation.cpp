@@ -4,6 +4,7 @@
 
 #include "bsdf/point_bsdf.h"
 #include "bsdf/straight_glass.h"
+#include "render/traced_gloss.h"
 #include "scene/rng_at_point.h"
 
 namespace lumicut {
@@ -19,6 +20,7 @@ struct ClampCompensation::Search {
     float travelled = 0.0f;  // from there to the ray's origin
     Rgb absorption{};        // on the ray's way, for each unit of length
     uint32_t passages = 0;
+    Rgb gloss{};  // the part of `weight` that virtual lights of bounced light leave to it
   };
   std::vector<RayHit> rays;
   std::vector<Carried> carried;
@@ -29,8 +31,14 @@ struct ClampCompensation::Search {
 };
 
 ClampCompensation::ClampCompensation(const Scene& scene, const Clamp& clamp, const NearbyLights* nearby, bool spheres,
-                                     uint64_t seed)
-    : scene_(scene), clamp_(clamp), nearby_(nearby), spheres_(spheres), seed_(seed), light_surfaces_(scene) {}
+                                     bool trace_gloss, uint64_t seed)
+    : scene_(scene),
+      clamp_(clamp),
+      nearby_(nearby),
+      spheres_(spheres),
+      trace_gloss_(trace_gloss),
+      seed_(seed),
+      light_surfaces_(scene) {}
 
 float ClampCompensation::lost_at(const Search& search, const Vec3f& position, float distance) const {
   const float clamp2 = clamp_.at2(position, search.scratch);
@@ -70,8 +78,8 @@ void ClampCompensation::find_surface(Search& search, size_t ray, TracedPoints& h
     } else if (c.passages < kMostStraight) {
       RayHit& on = search.next_rays.emplace_back();
       on.ray.org = next->origin, on.ray.dir = next->direction, on.ray.mask = next->state.kind;
-      search.next_carried.push_back(
-          {next->throughput, c.pixel, next->rng, c.pdf, c.from, distance, next->state.absorption, c.passages + 1});
+      search.next_carried.push_back({next->throughput, c.pixel, next->rng, c.pdf, c.from, distance,
+                                     next->state.absorption, c.passages + 1, c.gloss});
     }
   }
   if (at.bsdf.layers().empty()) return;
@@ -79,7 +87,9 @@ void ClampCompensation::find_surface(Search& search, size_t ray, TracedPoints& h
   // Spheres stand for all that is reflected evenly.
   const float lost = spheres_ ? 0.0f : lost_at(search, at.position, distance);
   for (SurfacePoint point : at.bsdf.layers()) {
+    const Rgb evenly = point.diffuse;
     point.diffuse = point.diffuse * lost;
+    if (trace_gloss_) point.diffuse += (evenly - point.diffuse) * c.gloss;
     // Chance decides by what the surface still shows, so that few points cost a whole sum of lights.
     const float survive = std::min(1.0f, max_component(PointBsdf(point).albedo() * weight));
     if (!(rng.next_float() < survive)) continue;
@@ -101,7 +111,15 @@ void ClampCompensation::trace(const ShadePoints& points, uint32_t level, const P
     RayHit ray;
     ray.ray.org = point.position, ray.ray.dir = s->direction, ray.ray.mask = ray_kind(s->flags);
     search.rays.push_back(ray);
-    search.carried.push_back({s->weight, point.pixel, rng, s->pdf, point.position, 0.0f, {}, 0});
+    search.carried.push_back({s->weight,
+                              point.pixel,
+                              rng,
+                              s->pdf,
+                              point.position,
+                              0.0f,
+                              {},
+                              0,
+                              trace_gloss_ ? traced_part(point, s->direction) : Rgb{}});
   }
   while (!search.rays.empty()) {
     trace_in_parts(std::span(search.rays), progress, [&](std::span<RayHit> part) { scene_.accel().intersect(part); });

@@ -8,6 +8,7 @@
 #include "core/rng.h"
 #include "render/clamp_compensation.h"
 #include "render/denoising_features.h"
+#include "render/traced_gloss.h"
 
 namespace lumicut {
 
@@ -240,21 +241,29 @@ class Batch {
   void add_light(const ShadePoints& points, std::vector<std::vector<Rgb>>& light, ShadeContext context, Noise noise,
                  uint32_t level) {
     if (points.size() == 0) return;
+    std::optional<ShadePoints> dimmed;
+    for (size_t g = 0; g < methods_.size(); ++g) {
+      if (methods_[g].method != nullptr) add_light(*methods_[g].method, points, light[g], context, noise, level);
+      if (methods_[g].bounced == nullptr) continue;
+      if (!dimmed) dimmed = without_traced_gloss(points);
+      add_light(*methods_[g].bounced, *dimmed, light[g], context, noise, level);
+    }
+  }
+
+  void add_light(const Integrator& method, const ShadePoints& points, std::vector<Rgb>& light, ShadeContext context,
+                 Noise noise, uint32_t level) {
     std::vector<Rgb> radiance(points.size());
     std::vector<PointCounts> counts(points.size());
-    for (size_t g = 0; g < methods_.size(); ++g) {
-      if (methods_[g].method == nullptr) continue;
-      methods_[g].method->shade(points, radiance, counts, context);
-      const bool noisy = noise == Noise::all ||
-                         (noise == Noise::beside_lights && (level > 1 || methods_[g].method->chooses_at_each_point()));
-      if (noisy)
-        for (size_t i = 0; i < points.size(); ++i) residual_[points.pixel[i]] += radiance[i];
-      for (size_t i = 0; i < points.size(); ++i) {
-        const uint32_t p = points.pixel[i];
-        light[g][p] += radiance[i];
-        counts_[p] += Vec3f{static_cast<float>(counts[i].clusters), static_cast<float>(counts[i].rays),
-                            static_cast<float>(counts[i].bounds)};
-      }
+    method.shade(points, radiance, counts, context);
+    const bool noisy =
+        noise == Noise::all || (noise == Noise::beside_lights && (level > 1 || method.chooses_at_each_point()));
+    if (noisy)
+      for (size_t i = 0; i < points.size(); ++i) residual_[points.pixel[i]] += radiance[i];
+    for (size_t i = 0; i < points.size(); ++i) {
+      const uint32_t p = points.pixel[i];
+      light[p] += radiance[i];
+      counts_[p] += Vec3f{static_cast<float>(counts[i].clusters), static_cast<float>(counts[i].rays),
+                          static_cast<float>(counts[i].bounds)};
     }
   }
 
@@ -359,7 +368,8 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
   const std::vector<Rect> tiles = frame_tiles(options);
   size_t batch_size = 1;
   for (const GroupMethod& m : methods)
-    if (m.method != nullptr) batch_size = std::max(batch_size, m.method->batch_size());
+    for (const Integrator* method : {m.method, m.bounced})
+      if (method != nullptr) batch_size = std::max(batch_size, method->batch_size());
   // Batches hold consecutive tiles, and depend on the integrator's wish alone: never on the number of threads.
   std::vector<std::pair<size_t, size_t>> batches;
   for (size_t first = 0; first < tiles.size();) {
@@ -375,7 +385,7 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
   if (scene.may_be_specular()) light_surfaces.emplace(scene);
   std::optional<ClampCompensation> compensation;
   if (light.compensated != nullptr)
-    compensation.emplace(scene, *light.compensated, light.nearby, light.spheres, options.seed);
+    compensation.emplace(scene, *light.compensated, light.nearby, light.spheres, light.trace_gloss, options.seed);
   context.progress.begin("render", size_t{options.crop.width()} * options.crop.height());
   tbb::parallel_for(
       tbb::blocked_range<size_t>(0, batches.size(), 1),

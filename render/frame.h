@@ -34,6 +34,8 @@ std::vector<Rect> frame_tiles(const FrameOptions& options);
 struct GroupMethod {
   uint32_t group;
   const Integrator* method;  // null: the group has no virtual lights
+  const Integrator* bounced =
+      nullptr;  // of its virtual lights of bounced light, where rays bring a part of their gloss
 };
 
 // What brings light beside the virtual lights. All outlive the frame.
@@ -41,6 +43,7 @@ struct FrameLight {
   const NearbyLights* nearby = nullptr;  // null: the clamp keeps what it takes from emitters
   const Clamp* compensated = nullptr;    // its loss is brought back by rays; null: it is not
   bool spheres = false;                  // virtual lights are, and lose nothing by it
+  bool trace_gloss = false;              // rays bring a part of the gloss of bounced light [traced_gloss.h]
 };
 
 // Light groups that something of the scene belongs to that emits, rising.

@@ -5,6 +5,7 @@
 
 #include "film/denoise.h"
 #include "render/checkpoint.h"
+#include "render/traced_gloss.h"
 
 namespace lumicut {
 
@@ -34,30 +35,38 @@ FrameLight RenderLoop::frame_light(const Prepared& prepared) const {
   light.nearby = prepared.nearby.get();
   if (prepared.params->common().compensate && preparation_.entry.light_source == LightSource::virtual_lights)
     light.compensated = prepared.clamp.get();
+  light.trace_gloss = light.compensated != nullptr && prepared.params->common().trace_gloss && may_trace_gloss(scene_);
   light.spheres = sphere_scale(prepared.params->common()) > 0.0f;
   return light;
 }
 
 std::vector<GroupMethod> RenderLoop::methods(const Prepared& prepared, std::vector<OfGroup>& of_groups,
                                              Progress& progress, Stats& stats) const {
-  const std::vector<uint32_t>& groups = film_.groups();
-  if (groups.empty()) return {{0, prepared.method.get()}};
+  const bool trace_gloss = frame_light(prepared).trace_gloss;
+  const std::vector<uint32_t> all_light{0}, &groups = film_.groups().empty() ? all_light : film_.groups();
+  if (film_.groups().empty() && !trace_gloss) return {{0, prepared.method.get()}};
   of_groups.clear();
   of_groups.resize(groups.size());
-  for (OfGroup& of : of_groups) of.lights.profiles = prepared.standing_off.profiles;
-  for (const Vpl& v : prepared.standing_off.lights) {
-    const auto at = std::lower_bound(groups.begin(), groups.end(), v.group);
-    if (at != groups.end() && *at == v.group)
-      of_groups[static_cast<size_t>(at - groups.begin())].lights.lights.push_back(v);
+  const VplSet& set = prepared.standing_off;
+  for (OfGroup& of : of_groups) of.lights.profiles = of.bounced_lights.profiles = set.profiles;
+  for (size_t i = 0; i < set.lights.size(); ++i) {
+    auto at = groups.begin();
+    if (!film_.groups().empty()) at = std::lower_bound(groups.begin(), groups.end(), set.lights[i].group);
+    if (at == groups.end() || (!film_.groups().empty() && *at != set.lights[i].group)) continue;
+    OfGroup& of = of_groups[static_cast<size_t>(at - groups.begin())];
+    (trace_gloss && i >= set.direct ? of.bounced_lights : of.lights).lights.push_back(set.lights[i]);
   }
+  const auto prepare = [&](const VplSet& lights, std::unique_ptr<Integrator>& method) {
+    progress.check();
+    if (lights.lights.empty()) return;
+    method = preparation_.entry.create();
+    method->prepare(scene_, lights, *prepared.params, {progress, stats});
+  };
   std::vector<GroupMethod> all;
   for (size_t g = 0; g < of_groups.size(); ++g) {
-    progress.check();
-    if (!of_groups[g].lights.lights.empty()) {
-      of_groups[g].method = preparation_.entry.create();
-      of_groups[g].method->prepare(scene_, of_groups[g].lights, *prepared.params, {progress, stats});
-    }
-    all.push_back({groups[g], of_groups[g].method.get()});
+    OfGroup& of = of_groups[g];
+    prepare(of.lights, of.method), prepare(of.bounced_lights, of.bounced);
+    all.push_back({groups[g], of.method.get(), of.bounced.get()});
   }
   return all;
 }

@@ -49,10 +49,11 @@ class RenderLoop {
   }
 
  private:
-  // What renders: the method as it was prepared, or one for the lights of each group.
+  // What renders: the method as it was prepared, or one for the lights of each group; where gloss is traced, one more
+  // for bounced light.
   struct OfGroup {
-    VplSet lights;
-    std::unique_ptr<Integrator> method;
+    VplSet lights, bounced_lights;
+    std::unique_ptr<Integrator> method, bounced;
   };
   void render_iterations(Progress& progress, Stats& stats, const std::function<void(const Rect&)>& tile_done);
   FrameSize whole_frame() const { return {options_.width, options_.height}; }

@@ -172,7 +172,7 @@ TEST(Compensation, VirtualLightsMeanThePathTracersImage) {
                    {.width = 32, .height = 24, .samples = 64})
           .radiance;
   constexpr int kPasses = static_cast<int>(test::trimmed(24));
-  std::vector<Rgb> mean(truth.size()), clamped(truth.size());
+  std::vector<Rgb> mean(truth.size()), clamped(truth.size()), traced(truth.size());
   for (int pass = 0; pass < kPasses; ++pass) {
     const VplSet vpls = test::lights_of(*scene, 1500, 100 + pass);
     // A clamp of 0.35 in a room of side 2: a loss nobody can miss.
@@ -181,14 +181,23 @@ TEST(Compensation, VirtualLightsMeanThePathTracersImage) {
     const auto cut = test::render(*scene, "exhaustive", vpls, settings, options).radiance;
     settings.emplace_back("compensate", "true");
     const auto full = test::render(*scene, "exhaustive", vpls, settings, options).radiance;
-    for (size_t i = 0; i < mean.size(); ++i) mean[i] += full[i] / float{kPasses}, clamped[i] += cut[i] / float{kPasses};
+    settings.emplace_back("trace_gloss", "true");
+    const auto by_rays = test::render(*scene, "exhaustive", vpls, settings, options).radiance;
+    for (size_t i = 0; i < mean.size(); ++i) {
+      mean[i] += full[i] / float{kPasses}, clamped[i] += cut[i] / float{kPasses};
+      traced[i] += by_rays[i] / float{kPasses};
+    }
   }
+  EXPECT_NE(traced, mean);
   EXPECT_LT(test::mean_luminance(clamped) / test::mean_luminance(truth), 0.95);
-  EXPECT_NEAR(test::mean_luminance(mean) / test::mean_luminance(truth), 1.0, test::trimmed_noise(0.01));
-  const auto found = region_means(mean, 32, 24, 4), expected = region_means(truth, 32, 24, 4);
-  for (size_t i = 0; i < found.size(); ++i)
-    EXPECT_NEAR(found[i], expected[i], test::trimmed_noise(0.025) * test::mean_luminance(truth))
-        << "part " << i;  // noise of both: up to 0.8 %
+  const auto expected = region_means(truth, 32, 24, 4);
+  for (const auto& image : {mean, traced}) {
+    EXPECT_NEAR(test::mean_luminance(image) / test::mean_luminance(truth), 1.0, test::trimmed_noise(0.01));
+    const auto found = region_means(image, 32, 24, 4);
+    for (size_t i = 0; i < found.size(); ++i)
+      EXPECT_NEAR(found[i], expected[i], test::trimmed_noise(0.025) * test::mean_luminance(truth))
+          << "part " << i;  // noise of both: up to 0.8 %
+  }
 }
 
 // Spheres clamp nothing, so compensation brings the gloss alone: what is reflected evenly must not come twice.

@@ -63,6 +63,7 @@ const Golden kGolden[] = {
     {"compensated", by("lightcuts", {{"compensate", "true"}}), 0x4bc466e76aaaee26},
     {"compensated_exhaustive", by("exhaustive", {{"compensate", "true"}}), 0xd0e9c3044004abbe},
     {"importance", by("lightcuts", {{"importance", "true"}, {"compensate", "true"}}), 0x7177d8eea101129b},
+    {"trace_gloss", by("lightcuts", {{"trace_gloss", "true"}, {"compensate", "true"}}), 0xe6e5dfb727a024cf},
     {"spheres", by("exhaustive", {{"virtual_lights", "spheres"}}), 0x4d64ebd9c51e1e66},
     {"spheres_lightcuts", by("lightcuts", {{"virtual_lights", "spheres"}, {"compensate", "true"}}), 0xd7713437e4fd7715},
     {"glass", by("lightcuts", {{"compensate", "true"}}, glass), 0xef65e01e9dac47aa},

@@ -104,5 +104,37 @@ TEST(RenderLoop, GroupsOfLightAddUpToAllLight) {
   EXPECT_LT(difference, 0.02 * total);
 }
 
+// Each group then has two methods: one for what bounced, whose gloss rays bring.
+TEST(RenderLoop, GroupsAddUpWhereGlossIsTraced) {
+  RoomRender one("exhaustive"), apart("exhaustive");
+  for (RoomRender* r : {&one, &apart}) {
+    std::vector<Light> lights = r->scene->lights();
+    lights[1].group = 3;
+    r->scene->set_lights(lights);
+    Progress progress;
+    r->scene->commit(progress);
+    r->preparation.params.set("compensate", "true"), r->preparation.params.set("trace_gloss", "true");
+  }
+  const auto all = one.render({}, 2);
+  IterationOptions by_group;
+  by_group.groups = true;
+  const auto sum = apart.render(std::move(by_group), 2, nullptr, light_groups(*apart.scene));
+  double difference = 0, total = 0;
+  for (size_t i = 0; i < all.size(); ++i) difference += std::abs(double{all[i]} - sum[i]), total += all[i];
+  EXPECT_LT(difference, 1e-5 * total) << "rounding";
+}
+
+TEST(RenderLoop, WhereNothingShinesGlossIsNotTraced) {
+  RoomRender without, with;
+  for (RoomRender* r : {&without, &with}) {
+    r->scene->set_materials(std::vector<Material>(4, test::diffuse(0.5f, 0.5f, 0.5f)));
+    Progress progress;
+    r->scene->commit(progress);
+    r->preparation.params.set("compensate", "true");
+  }
+  with.preparation.params.set("trace_gloss", "true");
+  EXPECT_EQ(with.render({}, 2), without.render({}, 2));
+}
+
 }  // namespace
 }  // namespace lumicut
