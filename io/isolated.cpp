@@ -92,7 +92,8 @@ std::string isolated(const std::string& file, const std::string& reader, double 
   }
   if (WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL))
     throw FileError(
-        file, fmt::format("{} was ended: it took more than {:.0f} s, or more memory than there is", reader, seconds));
+        file, fmt::format("{} was ended: it took more than {:.0f} s of the processor, or more memory than there is",
+                          reader, seconds));
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || answer.empty())
     throw FileError(file,
                     fmt::format("{} broke at it (signal {})", reader, WIFSIGNALED(status) ? WTERMSIG(status) : 0));

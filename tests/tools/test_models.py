@@ -9,7 +9,7 @@ import unittest
 import OpenImageIO as oiio
 
 import cli
-from cli import BAD_FILE, COMMAND, OK, lumicut
+from cli import BAD_FILE, COMMAND, OK, ROOT, lumicut
 
 # A box that stands on a floor, seen from above: (corners, faces)
 FLOOR = ([(-3, 0, 3), (3, 0, 3), (3, 0, -3), (-3, 0, -3)], [(0, 1, 2, 3)])
@@ -93,7 +93,7 @@ def collada(meshes, up="Y_UP", meter=1.0):
         '<scene><instance_visual_scene url="#s"/></scene></COLLADA>')
 
 
-def fbx(meshes, unit=100.0):
+def fbx(meshes, unit=100.0, creator="", lamp=""):
     """ASCII FBX 7.3, lengths in `unit` centimetres."""
     def p(name, kind, *values):
         return f'P: "{name}", "{kind}", "", "A",{",".join(map(str, values))}\n'
@@ -122,12 +122,12 @@ def fbx(meshes, unit=100.0):
         'Model: 11, "Model::c", "Camera" {\nProperties70:  {\n' + p("Lcl Translation", "Lcl Translation", *EYE) +
         p("RotationActive", "bool", 1) + p("RotationOrder", "enum", 5) + p("Lcl Rotation", "Lcl Rotation", 0, around_y, around_z) + "}\n}\n",
         'NodeAttribute: 12, "NodeAttribute::l", "Light" {\nTypeFlags: "Light"\nProperties70:  {\n' + p("LightType", "enum", 0) +
-        p("Intensity", "Number", 100 * WATT) + "}\n}\n",
+        p("Intensity", "Number", 100 * WATT) + lamp + "}\n}\n",
         'Model: 13, "Model::l", "Light" {\nProperties70:  {\n' + p("Lcl Translation", "Lcl Translation", *LAMP) + "}\n}\n"]
     links += [(11, 0), (10, 11), (13, 0), (12, 13)]
     settings = p("UpAxis", "int", 1) + p("UpAxisSign", "int", 1) + p("FrontAxis", "int", 2) + p("FrontAxisSign", "int", 1)
     settings += p("CoordAxis", "int", 0) + p("CoordAxisSign", "int", 1) + p("UnitScaleFactor", "double", unit)
-    return ("; FBX 7.3.0 project file\nFBXHeaderExtension:  {\nFBXHeaderVersion: 1003\nFBXVersion: 7300\n}\nGlobalSettings:  {\nVersion: 1000\n"
+    return ("; FBX 7.3.0 project file\nFBXHeaderExtension:  {\nFBXHeaderVersion: 1003\nFBXVersion: 7300\n" + creator + "}\nGlobalSettings:  {\nVersion: 1000\n"
             "Properties70:  {\n" + settings + "}\n}\nObjects:  {\n" + "".join(objects) + "}\nConnections:  {\n" +
             "".join(f'C: "OO",{a},{b}\n' for a, b in links) + "}\n")
 
@@ -167,6 +167,13 @@ class Models(cli.Cli):
             with self.subTest(name):
                 self.assert_same(self.render(self.write(name, text))[0], expected, share)
 
+    def test_grey_of_a_lamp_is_blenders_white_in_its_files_alone(self):
+        meshes = {"floor": (FLOOR, (0.6, 0.55, 0.5))}
+        grey = 'P: "Color", "Color", "", "A",0.8,0.8,0.8\n'
+        white, _ = self.render(self.write("white.fbx", fbx(meshes)))
+        self.assert_same(self.render(self.write("a.fbx", fbx(meshes, creator='Creator: "Blender (stable FBX IO)"\n', lamp=grey)))[0], white)
+        self.assert_same(self.render(self.write("b.fbx", fbx(meshes, creator='Creator: "Another"\n', lamp=grey)))[0], 0.8 * white)
+
     def test_units_of_length_are_metres(self):
         # In half metres all is half as long, and the lamp four times as bright.
         meshes = {"floor": (FLOOR, (0.6, 0.55, 0.5)), "box": (BOX, (0.7, 0.2, 0.1))}
@@ -187,6 +194,10 @@ class Models(cli.Cli):
         self.assert_ends(lumicut("render", self.folder / "none.fbx", "-o", self.folder / "x.exr"), BAD_FILE, "none.fbx", "no such file")
         os.mkfifo(self.folder / "pipe.fbx")
         self.assert_ends(lumicut("render", self.folder / "pipe.fbx", "-o", self.folder / "x.exr"), BAD_FILE, "pipe.fbx")
+
+    def test_a_file_in_which_assimp_reads_for_ever_ends_in_an_error(self):
+        (self.folder / "endless.ply").write_bytes((ROOT / "tests/fuzz/corpus/model/endless_ply").read_bytes()[1:])
+        self.assert_ends(lumicut("render", self.folder / "endless.ply", "-o", self.folder / "x.exr"), BAD_FILE, "endless.ply", "2 s of the processor")
 
     def test_colours_of_vertices_of_a_ply_are_its_colour(self):
         text = ply(FLOOR).replace("property float z\n", "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n")
