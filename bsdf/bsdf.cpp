@@ -37,6 +37,7 @@ Bsdf::Bsdf(const BsdfParameters& parameters, const SurfaceView& view)
   p.position = origin(kReflected);
   p.normal = normal_;
   p.pixel = view.pixel;
+  p.smooth = behind_ ? -view.smooth : view.smooth;
   if (parameters.model != LobeModel::ggx) {
     p.mirror = normalize(reflect(to_viewer_, p.normal));
     p.diffuse = parameters.diffuse * kInvPi;
@@ -79,6 +80,7 @@ void Bsdf::add_other_side() {
   other.normal = other.mirror = -normal_;
   other.diffuse = parameters_.translucency * kInvPi;
   other.pixel = layers_[0].pixel;
+  other.smooth = -layers_[0].smooth;
 }
 
 Rgb Bsdf::evaluate(const Vec3f& to_light) const {

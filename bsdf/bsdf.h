@@ -21,6 +21,7 @@ struct SurfaceView {
   Vec3f position, geometric_normal, normal, to_viewer;
   float offset;  // of ray origins from the surface
   uint32_t pixel = 0;
+  Vec3f smooth{};  // unit shading normal before textures bent it, where that dims (bsdf/bump_shadow.h); else 0
 };
 
 // The continuation of a light path: its flux is multiplied by weight · factor (which holds the chance of the roulette).

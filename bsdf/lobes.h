@@ -111,11 +111,18 @@ using LaneLobes = LobeList<LUMICUT_LOBES>;
 struct DiffuseShape {
   V falloff, retro, dim;
   bool burley;  // of some lane
+  bool bent;    // of any point; else `smooth` is 0
+  V3 smooth;
 };
 template <class Points>
 HWY_INLINE DiffuseShape LoadDiffuse(D d, const Points& points, size_t p) {
   const V retro = Load1(d, points.retro, p), dim = Load1(d, points.dim, p);
-  return {Load1(d, points.falloff, p), retro, dim, !hn::AllFalse(d, hn::Gt(hn::Add(retro, dim), hn::Zero(d)))};
+  const V zero = hn::Zero(d);
+  DiffuseShape shape{
+      Load1(d, points.falloff, p), retro, dim, !hn::AllFalse(d, hn::Gt(hn::Add(retro, dim), zero)), points.bent(),
+      {zero, zero, zero}};
+  if (shape.bent) shape.smooth = Load3(d, points.smooth, p);
+  return shape;
 }
 // Of Lambert's part: `view` is n·m.
 HWY_INLINE V DiffuseFactor(D d, const DiffuseShape& s, V view, V cosine, V beta) {
@@ -157,11 +164,13 @@ HWY_INLINE LobeShape LoadShape(D d, const Points& points, size_t p) {
   if constexpr (kLobes == Lobes::all)
     return ShapeOfAny(LaneLobes{}, d, {Load1(d, points.shape, p), Load1(d, points.ior, p)}, LoadDiffuse(d, points, p),
                       Load1(du, points.lobe, p));
-  else
+  else {
+    const V zero = hn::Zero(d);
     return {{kLobes == Lobes::cosine ? Load1(d, points.shape, p) : hn::Zero(d), hn::Zero(d)},
-            {hn::Zero(d), hn::Zero(d), hn::Zero(d), false},
+            {zero, zero, zero, false, false, {zero, zero, zero}},
             hn::Zero(du),
             {}};
+  }
 }
 
 template <bool kAskLast, LaneLobe L, LaneLobe... Rest>

@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "bsdf/bump_shadow.h"
 #include "bsdf/burley.h"
 #include "bsdf/lambert.h"
 #include "bsdf/lobes.h"
@@ -19,6 +20,7 @@ inline Rgb specular_albedo(const SurfacePoint& p) {
 inline Rgb reflectance(const SurfacePoint& p, const Vec3f& to_light) {
   const float cosine = dot(p.normal, to_light);
   float even = diffuse_falloff(p.falloff, cosine);
+  if (p.bent() && cosine > 0.0f) even *= bump_shadow(p, cosine, to_light);
   if (p.burley()) even *= burley_factor(p, cosine, dot(p.mirror, to_light));
   Rgb f = p.diffuse * even;
   f += with_lobe(p, [&](auto lobe) { return lobe.value(p, to_light); });

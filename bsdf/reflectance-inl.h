@@ -7,6 +7,7 @@
 #define LUMICUT_BSDF_REFLECTANCE_INL_H_
 #endif
 
+#include "bsdf/bump_shadow.h"
 #include "bsdf/lanes-inl.h"
 #include "bsdf/lobes.h"
 
@@ -31,6 +32,8 @@ HWY_INLINE LobeSums LobesTowards(D d, const V3& normal, const V3& mirror, const 
     parts.specular = v.lobe;
     if constexpr (kLobes == Lobes::all) {
       parts.diffuse = DiffuseFactor(d, shape.diffuse, Dot(normal, mirror), cosine, beta);
+      if (shape.diffuse.bent)
+        parts.diffuse = hn::Mul(parts.diffuse, BumpShadow(d, shape.diffuse.smooth, normal, cosine, to_light));
       parts.grazing = hn::Mul(v.lobe, v.fresnel);
       parts.specular = hn::NegMulAdd(v.lobe, v.fresnel, v.lobe);
     }

@@ -9,7 +9,8 @@ namespace {
 template <typename Points, typename Fn>
 void for_each_array(Points& p, Fn fn) {
   for (int k = 0; k < 3; ++k)
-    fn(p.position[k]), fn(p.normal[k]), fn(p.mirror[k]), fn(p.diffuse[k]), fn(p.specular[k]), fn(p.grazing[k]);
+    fn(p.position[k]), fn(p.normal[k]), fn(p.mirror[k]), fn(p.diffuse[k]), fn(p.specular[k]), fn(p.grazing[k]),
+        fn(p.smooth[k]);
   fn(p.shape), fn(p.ior), fn(p.falloff), fn(p.retro), fn(p.dim), fn(p.lobe), fn(p.pixel);
 }
 }  // namespace
@@ -18,6 +19,7 @@ void ShadePoints::clear() {
   for_each_array(*this, [](auto& a) { a.clear(); });
   size_ = 0;
   lobes_ = Lobes::none;
+  bent_ = false;
 }
 
 void ShadePoints::reserve(size_t n) {
@@ -33,11 +35,13 @@ void ShadePoints::push(const SurfacePoint& p) {
     diffuse[k].push_back(p.diffuse[k]);
     specular[k].push_back(p.specular[k]);
     grazing[k].push_back(p.grazing[k]);
+    smooth[k].push_back(p.smooth[k]);
   }
   shape.push_back(p.shape), ior.push_back(p.ior);
   falloff.push_back(p.falloff), retro.push_back(p.retro), dim.push_back(p.dim);
   lobe.push_back(p.lobe), pixel.push_back(p.pixel);
   lobes_ = std::max(lobes_, p.lobes());
+  bent_ |= p.bent();
   ++size_;
 }
 
@@ -50,7 +54,7 @@ void ShadePoints::finish() {
 SurfacePoint ShadePoints::get(size_t i) const {
   const auto at = [i](const std::vector<float>(&a)[3]) { return Vec3f{a[0][i], a[1][i], a[2][i]}; };
   return {at(position), at(normal), at(mirror), at(diffuse), at(specular), at(grazing), shape[i],
-          ior[i],       lobe[i],    falloff[i], retro[i],    dim[i],       pixel[i]};
+          ior[i],       lobe[i],    falloff[i], retro[i],    dim[i],       pixel[i],    at(smooth)};
 }
 
 }  // namespace lumicut

@@ -31,10 +31,12 @@ struct SurfacePoint {
   float falloff = 0.0f;            // of the diffuse part towards grazing light (bsdf/lambert.h)
   float retro = 0.0f, dim = 0.0f;  // of the diffuse part, as Burley's is (bsdf/burley.h)
   uint32_t pixel = 0;              // points of one pixel lie together
+  Vec3f smooth{};  // unit: before textures bent the normal, where that dims (bsdf/bump_shadow.h); else 0
 
   bool burley() const { return retro > 0.0f || dim > 0.0f; }
+  bool bent() const { return smooth != Vec3f{}; }
   Lobes lobes() const {
-    if (lobe != kCosineLobe || falloff > 0.0f || burley()) return Lobes::all;
+    if (lobe != kCosineLobe || falloff > 0.0f || burley() || bent()) return Lobes::all;
     return max_component(specular) > 0.0f ? Lobes::cosine : Lobes::none;
   }
   // All light that it reflects, times `factor`: what a path has lost on its way here.
@@ -42,14 +44,15 @@ struct SurfacePoint {
 };
 
 struct ShadePoints {
-  // position, normal, mirror, diffuse, specular, grazing: [component][point]
-  std::vector<float> position[3], normal[3], mirror[3], diffuse[3], specular[3], grazing[3], shape, ior, falloff, retro,
-      dim;
+  // position, normal, mirror, diffuse, specular, grazing, smooth: [component][point]
+  std::vector<float> position[3], normal[3], mirror[3], diffuse[3], specular[3], grazing[3], smooth[3], shape, ior,
+      falloff, retro, dim;
   std::vector<uint32_t> lobe, pixel;
 
   size_t size() const { return size_; }
   // Of any of the points: kernels skip what none has.
   Lobes lobes() const { return lobes_; }
+  bool bent() const { return bent_; }
   void clear();
   void reserve(size_t n);
   void push(const SurfacePoint& p);
@@ -62,6 +65,7 @@ struct ShadePoints {
  private:
   size_t size_ = 0;
   Lobes lobes_ = Lobes::none;
+  bool bent_ = false;  // any of the points
 };
 
 }  // namespace lumicut

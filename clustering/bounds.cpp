@@ -25,6 +25,7 @@ void light_node_bounds(const LightNode& node, const PointBlock& block, float* bo
 
 void PointBlock::load(const ShadePoints& points, size_t first) {
   lobes = Lobes::none;
+  any_bent = points.bent();
   for (size_t i = 0; i < kLanes; ++i) {
     const SurfacePoint p = points.get(first + i);
     const Frame n(p.normal), m(p.mirror);
@@ -34,6 +35,8 @@ void PointBlock::load(const ShadePoints& points, size_t first) {
       mirror[k][i] = p.mirror[k], mirror_tangent[k][i] = m.t[k], mirror_bitangent[k][i] = m.b[k];
       diffuse[k][i] = p.diffuse[k], specular[k][i] = p.specular[k], grazing[k][i] = p.grazing[k];
     }
+    if (any_bent)
+      for (int k = 0; k < 3; ++k) smooth[k][i] = p.smooth[k];
     shape[i] = p.shape, ior[i] = p.ior, lobe[i] = p.lobe;
     falloff[i] = p.falloff, retro[i] = p.retro, dim[i] = p.dim;
     lobes = std::max(lobes, p.lobes());

@@ -126,13 +126,14 @@ Rgb light_point(const Vpl& light, const Rgb& intensity, Falloff falloff, const S
   Vec3f to_light = -light.normal;
   float geometry = 1.0f;
   if (light.kind != VplKind::directional) {
-    const Vec3f v = light.position - point.position;
+    const Vec3f v = (light.facing ? place_facing(light, point.position) : light.position) - point.position;
     const float dist2 = std::max(length2(v), 1e-30f);
     to_light = v / std::sqrt(dist2);
     geometry = 1.0f / std::max(dist2, light.clamp2);
     const float cosine = -dot(light.normal, to_light);
     if (light.kind == VplKind::oriented) geometry *= std::max(0.0f, cosine);
     if (light.kind == VplKind::spot) geometry *= falloff.of_spot(light, -to_light);
+    if (light.facing) geometry *= length(light.position - light.from_centre - point.position) / std::sqrt(dist2);
   }
   geometry *= std::max(0.0f, dot(point.normal, to_light));
   if (!(geometry > 0.0f)) return {};

@@ -9,6 +9,7 @@
 #include "bsdf/shade_points.h"
 #include "core/stats.h"
 #include "lights/falloff.h"
+#include "lights/soft_lamp.h"
 #include "lights/vpl.h"
 
 namespace lumicut {
@@ -51,16 +52,36 @@ void light_points(const Vpl& light, const Rgb& intensity, Falloff falloff, const
                   size_t count, LitPoints& lit, const uint16_t* lanes = nullptr,
                   const DirectionScatter* scatter = nullptr);
 
-// Where its shadow rays begin.
-inline BundleOrigin shadow_origin(const Vpl& light) {
+// Where its shadow rays begin, to points about `middle`. A lamp with a radius has its place on the disk that faces them: else
+// half of a lamp at a ceiling stood above it.
+inline BundleOrigin shadow_origin(const Vpl& light, const Vec3f& middle) {
   const bool directional = light.kind == VplKind::directional;
+  if (light.lamp_radius > 0.0f) return {place_facing(light, middle), false, light.ray_mask};
   return {directional ? -light.normal : light.position, directional, light.ray_mask};
+}
+
+// Shadow rays from the light to n points; fills `occluded`. To a lamp with a radius each goes on its own: what a point
+// sees must not depend on its neighbours, or borders of images showed.
+inline void trace_shadows(const Accel& accel, const Vpl& light, const float* x, const float* y, const float* z,
+                          size_t n, uint8_t* occluded) {
+  if (!(light.lamp_radius > 0.0f)) return accel.occluded_from_point(shadow_origin(light, {}), x, y, z, n, occluded);
+  constexpr size_t kMost = 64;
+  for (size_t begin = 0; begin < n; begin += kMost) {
+    Ray rays[kMost];
+    const size_t count = std::min(kMost, n - begin);
+    for (size_t i = 0; i < count; ++i) {
+      const Vec3f point{x[begin + i], y[begin + i], z[begin + i]};
+      rays[i].org = place_facing(light, point), rays[i].dir = point - rays[i].org;
+      rays[i].tfar = 0x1.fffffep-1f, rays[i].mask = light.ray_mask;
+    }
+    accel.occluded({rays, count});
+    for (size_t i = 0; i < count; ++i) occluded[begin + i] = rays[i].tfar < 0.0f;
+  }
 }
 
 // Shadow rays from the light to the lit points; fills `occluded`.
 inline void trace_lit(const Accel& accel, const Vpl& light, LitPoints& lit) {
-  if (lit.count == 0) return;
-  accel.occluded_from_point(shadow_origin(light), lit.x, lit.y, lit.z, lit.count, lit.occluded);
+  if (lit.count > 0) trace_shadows(accel, light, lit.x, lit.y, lit.z, lit.count, lit.occluded);
 }
 
 // The same for one point, in plain arithmetic: what the kernel is tested against, and for code that is not hot.

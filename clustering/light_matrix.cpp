@@ -67,7 +67,8 @@ struct Tile {
         for (size_t l = 0; l < count; ++l) {
           const Vpl& v = lights[l];
           if (row[l] == 0.0f || v.kind == VplKind::directional || v.ray_mask != mask) continue;
-          x[n] = v.position.x, y[n] = v.position.y, z[n] = v.position.z;
+          const Vec3f place = shadow_origin(v, rows.position_at(r)).light;
+          x[n] = place.x, y[n] = place.y, z[n] = place.z;
           index[n++] = static_cast<uint32_t>(l);
         }
         if (n == 0) continue;

@@ -155,6 +155,11 @@ void LightTree::add_kind(const std::vector<Vpl>& lights, const std::vector<uint3
     const Vpl& v = lights[members[i]];
     Cluster& c = clusters[i];
     c.positions.extend(v.position);
+    if (v.facing) {
+      const Vec3f centre = v.position - v.from_centre;
+      const float r = length(v.from_centre);  // a place on the disk is no farther from the centre
+      c.positions.extend(centre - Vec3f{r, r, r}), c.positions.extend(centre + Vec3f{r, r, r});
+    }
     c.directions.extend(v.normal);
     c.intensity = v.intensity;
     c.least_distance2 = v.clamp2;

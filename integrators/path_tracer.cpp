@@ -160,12 +160,13 @@ class PathTracer final : public Integrator {
                   std::vector<Shadow>& shadows) const {
     if (!(max_component(value) > 0.0f) || !is_finite(value)) return;
     Ray ray;
-    ray.org = path.point.position, ray.mask = kShadowRay;
+    ray.org = path.point.position, ray.mask = light.ray_mask;
     if (light.kind == VplKind::directional) {
       ray.dir = -light.normal;
     } else {
       // Emissive meshes block: the ray ends before them.
-      const Vec3f end = light.kind == VplKind::oriented ? light.position + light.normal * offset : light.position;
+      const Vec3f end = light.kind == VplKind::oriented ? light.position + light.normal * offset
+                                                        : shadow_origin(light, path.point.position).light;
       ray.dir = end - ray.org, ray.tfar = 1.0f;
     }
     rays.push_back(ray);

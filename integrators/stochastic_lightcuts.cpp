@@ -152,7 +152,8 @@ class StochasticLightcuts final : public Integrator {
       if (light.kind == VplKind::directional) {
         ray.org = point.position, ray.dir = -light.normal;
       } else {
-        ray.org = light.position, ray.dir = point.position - light.position, ray.tfar = 0x1.fffffep-1f;
+        ray.org = shadow_origin(light, point.position).light, ray.dir = point.position - ray.org,
+        ray.tfar = 0x1.fffffep-1f;
       }
       work.rays.push_back(ray);
       work.light.push_back(given);

@@ -71,7 +71,9 @@ struct SceneData {
   std::optional<lumicut_environment> environment;
   lumicut_camera camera{};
   uint32_t width = 512, height = 512, samples = 1;  // what the scene file proposes
-  Warnings warnings;                                // what is approximated or looks wrong
+  uint32_t filter = LUMICUT_BOX;
+  float filter_width = 0.0f;
+  Warnings warnings;  // what is approximated or looks wrong
 
   uint64_t triangle_count() const {
     uint64_t n = 0;

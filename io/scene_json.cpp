@@ -178,14 +178,41 @@ class SceneReader {
       scene_.height = static_cast<uint32_t>(elements[1].integer(1, 65536));
     }
     scene_.samples = static_cast<uint32_t>(image.integer("samples", 1, 1, 65536));
+    if (auto filter = image.find("filter"))
+      scene_.filter = static_cast<uint32_t>(filter->choice({"box", "gaussian", "blackman_harris"}));
+    if (scene_.filter != LUMICUT_BOX)
+      scene_.filter_width = static_cast<float>(image.number("filter_width", 1.5, 0.01, 10));
     image.finish();
+  }
+
+  static void read_panorama(JsonObject& object, lumicut_camera& camera) {
+    const auto angles = [&](const char* key, float* out, double most) {
+      const auto given = object.find(key);
+      const auto pair = given ? given->numbers(2, -most, most) : std::vector<double>{-most, most};
+      out[0] = static_cast<float>(radians(pair[0])), out[1] = static_cast<float>(radians(pair[1]));
+    };
+    if (camera.panorama == LUMICUT_EQUIRECTANGULAR) {
+      angles("longitude", camera.longitude, 180);
+      angles("latitude", camera.latitude, 90);
+      return;
+    }
+    camera.fisheye_fov = static_cast<float>(radians(object.need("fov").number(0.1, 360)));
+    if (camera.panorama == LUMICUT_FISHEYE_EQUIDISTANT) return;
+    camera.fisheye_lens = static_cast<float>(object.need("lens").number(1e-6, 1e6));
+    const auto sensor = object.need("sensor").numbers(2, 1e-6, 1e6);
+    camera.sensor[0] = static_cast<float>(sensor[0]), camera.sensor[1] = static_cast<float>(sensor[1]);
   }
 
   void read_camera(const JsonValue& value) {
     JsonObject object(value);
     lumicut_camera& camera = scene_.camera;
     camera.struct_size = sizeof(camera);
-    camera.orthographic = object.has("type") && object.need("type").choice({"perspective", "orthographic"}) == 1;
+    const size_t type = object.has("type")
+                            ? object.need("type").choice({"perspective", "orthographic", "equirectangular",
+                                                          "fisheye_equidistant", "fisheye_equisolid"})
+                            : 0;
+    camera.orthographic = type == 1;
+    camera.panorama = type < 2 ? 0 : static_cast<uint32_t>(type - 1);
     Matrix m{};
     if (auto given = object.find("matrix")) {
       m = matrix(*given);
@@ -210,10 +237,14 @@ class SceneReader {
     for (size_t k = 0; k < 12; ++k) camera.to_world[k] = static_cast<float>(m[k]);
     if (camera.orthographic) {
       camera.height = static_cast<float>(object.need("height").number(1e-20 / scale_, largest()) * scale_);
+    } else if (camera.panorama != 0) {
+      read_panorama(object, camera);
     } else {
       camera.fov_y = static_cast<float>(radians(object.need("fov_y").number(0.01, 179.0)));
     }
-    if (auto shift = object.find("shift")) {
+    if (camera.panorama != 0) {
+      // All around there is no lens to shift or to open.
+    } else if (auto shift = object.find("shift")) {
       const auto s = shift->numbers(2, -100, 100);
       camera.shift[0] = static_cast<float>(s[0]), camera.shift[1] = static_cast<float>(s[1]);
     }
@@ -221,6 +252,7 @@ class SceneReader {
     camera.far_clip = static_cast<float>(object.number("far", 0, 0, largest()) * scale_);
     if (camera.far_clip != 0 && camera.far_clip <= camera.near_clip)
       value.fail("\"far\" must be beyond \"near\" (or 0: no limit)");
+    if (camera.panorama != 0) return object.finish();
     camera.pixel_aspect = static_cast<float>(object.number("pixel_aspect", 1, 0.01, 100));
     camera.lens_radius = static_cast<float>(object.number("lens_radius", 0, 0, largest()) * scale_);
     camera.focus_distance = static_cast<float>(object.number("focus_distance", 0, 0, largest()) * scale_);
@@ -304,6 +336,7 @@ class SceneReader {
     number("coat_ior", m.coat_ior, 1, 10, ggx);
     if (auto both = object.find("emit_both_sides")) set_flag(LUMICUT_EMIT_BOTH_SIDES, both->boolean());
     if (auto holdout = object.find("holdout")) set_flag(LUMICUT_HOLDOUT, holdout->boolean());
+    if (auto bumps = object.find("bump_shadows")) set_flag(LUMICUT_BUMP_SHADOWS, bumps->boolean());
     const auto texture = [&](const char* key, int32_t& out, TextureUse use, bool by_view = false) {
       const auto value = object.find(key);
       if (!value) return;
@@ -708,12 +741,14 @@ class SceneReader {
     light.group = group(object);
     store(light.color, object.vector3("color", {1, 1, 1}, 0, 1e15));
     light.value = static_cast<float>(object.need("value").number(0, 1e20));
+    if (!object.boolean("shadows", true)) light.flags |= LUMICUT_NO_SHADOWS;
     if (light.type == LUMICUT_SUN) {
       store(light.direction, direction(object.need("direction")));
       light.radius = static_cast<float>(radians(object.number("angular_radius", 0, 0, 90)));
     } else if (light.type == LUMICUT_POINT || light.type == LUMICUT_SPOT) {
       store(light.position, point(object.need("position")));
       light.radius = static_cast<float>(object.number("radius", 0, 0, largest()) * scale_);
+      if (object.boolean("facing_disk", false)) light.flags |= LUMICUT_FACING_DISK;
       if (light.type == LUMICUT_SPOT) {
         store(light.direction, direction(object.need("direction")));
         light.angle = static_cast<float>(radians(object.need("angle").number(0.12, 180)));

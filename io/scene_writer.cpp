@@ -133,6 +133,9 @@ class Writer {
     Json out;
     out["description"] = fmt::format("Converted from {}", fs::path(scene_.file).filename().string());
     out["image"] = {{"size", {scene_.width, scene_.height}}, {"samples", scene_.samples}};
+    constexpr const char* kFilters[] = {"box", "gaussian", "blackman_harris"};
+    if (scene_.filter != LUMICUT_BOX)
+      out["image"]["filter"] = kFilters[scene_.filter], out["image"]["filter_width"] = double{scene_.filter_width};
     out["camera"] = camera();
     Json programs = Json::array();
     for (size_t t = 0; t < scene_.textures.size(); ++t)
@@ -281,6 +284,7 @@ class Writer {
     flag(LUMICUT_SHADOWS_PASS, "shadows_pass", true);
     flag(LUMICUT_EMIT_BOTH_SIDES, "emit_both_sides", true);
     flag(LUMICUT_HOLDOUT, "holdout", true);
+    flag(LUMICUT_BUMP_SHADOWS, "bump_shadows", true);
     const auto colour = [&](const char* key, const float* now, const float* before, bool always = false) {
       if (always || !std::equal(now, now + 3, before)) out[key] = numbers(now, 3);
     };
@@ -317,9 +321,27 @@ class Writer {
 
   // ---- Camera and lights
 
+  Json panorama(Json out) const {
+    const lumicut_camera& c = scene_.camera;
+    constexpr const char* kTypes[] = {"equirectangular", "fisheye_equidistant", "fisheye_equisolid"};
+    out["type"] = kTypes[c.panorama - 1];
+    if (c.near_clip != 0) out["near"] = double{c.near_clip};
+    if (c.far_clip != 0) out["far"] = double{c.far_clip};
+    if (c.panorama == LUMICUT_EQUIRECTANGULAR) {
+      out["longitude"] = {degrees(c.longitude[0]), degrees(c.longitude[1])};
+      out["latitude"] = {degrees(c.latitude[0]), degrees(c.latitude[1])};
+      return out;
+    }
+    out["fov"] = degrees(c.fisheye_fov);
+    if (c.panorama == LUMICUT_FISHEYE_EQUISOLID)
+      out["lens"] = double{c.fisheye_lens}, out["sensor"] = numbers(c.sensor, 2);
+    return out;
+  }
+
   Json camera() const {
     const lumicut_camera& c = scene_.camera;
     Json out{{"matrix", numbers(c.to_world, 12)}};
+    if (c.panorama != 0) return panorama(out);
     if (c.orthographic != 0) {
       out["type"] = "orthographic";
       out["height"] = double{c.height};
@@ -340,6 +362,7 @@ class Writer {
     Json out{{"type", kTypes[l.type]}, {"value", double{l.value}}, {"color", numbers(l.color, 3)}};
     if (l.unit == LUMICUT_WATT) out["unit"] = "watt";
     if (l.group != 0) out["group"] = l.group;
+    if ((l.flags & LUMICUT_NO_SHADOWS) != 0) out["shadows"] = false;
     if (l.type == LUMICUT_SUN) {
       out["direction"] = direction(l.direction);
       if (l.radius != 0) out["angular_radius"] = degrees(l.radius);
@@ -352,6 +375,7 @@ class Writer {
       return out;
     }
     if (l.radius != 0) out["radius"] = double{l.radius};
+    if ((l.flags & LUMICUT_FACING_DISK) != 0) out["facing_disk"] = true;
     if (l.type == LUMICUT_SPOT) {
       out["direction"] = direction(l.direction);
       out["angle"] = degrees(l.angle);

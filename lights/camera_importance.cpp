@@ -269,7 +269,7 @@ namespace {
 
 // What a virtual light gives to a point of the camera, shadow aside, and the ray that looks for that.
 double given_to(const SurfacePoint& point, const DirectSample& s, const Falloff& profiles, Ray& shadow) {
-  shadow.org = point.position, shadow.tnear = 0.0f, shadow.mask = kShadowRay;
+  shadow.org = point.position, shadow.tnear = 0.0f, shadow.mask = s.vpl.ray_mask;
   Vec3f towards = -s.vpl.normal;
   float falloff = 1.0f;
   shadow.dir = towards;

@@ -3,6 +3,7 @@
 #include <tuple>
 
 #include "lights/light_sampler.h"
+#include "lights/light_vpls.h"
 
 namespace lumicut {
 
@@ -44,7 +45,7 @@ std::optional<EmitterShape> LightSampler::shape(size_t i) const {
     s.both_sides = scene_.materials()[mesh.material_of(e.triangle)].emit_both_sides;
     return s;
   }
-  if (e.kind == Kind::sun) return {};
+  if (e.kind == Kind::sun || e.kind == Kind::soft) return {};
   const Light& l = scene_.lights()[e.index];
   if (e.kind == Kind::sphere) {
     s.kind = EmitterShape::Kind::sphere, s.corner = l.position, s.radius = l.radius;
@@ -98,7 +99,7 @@ Vpl LightSampler::place_on(size_t i, const EmitterShape& s, const Vec3f& at, con
     return v;
   }
   const Light& l = scene_.lights()[e.index];
-  v.group = l.group;
+  v.group = l.group, v.ray_mask = shadow_mask(l);
   offset = 0.0f;  // lights block nothing
   if (e.kind == Kind::sphere) {
     v.normal = normalize(at - l.position);

@@ -20,6 +20,9 @@ struct LightPath {
   Rgb absorption{};  // on its way, for each unit of length
   // RayKind: the first ray meets what stops samples of its light, and what is seen.
   uint32_t kind = kDiffuseRay | kShadowRay;
+  Vec3f disk_centre{};  // as EmittedRay has it
+  float disk_radius = 0.0f;
+  bool shadows = true;
 };
 
 // Follows paths [first, last) in step, so that rays are traced in batches.
@@ -35,6 +38,8 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
     const EmittedRay e = emitters.sample_ray(rng, starts);
     if (!(max_component(e.flux) > 0.0f)) continue;
     paths.push_back({e.origin, e.direction, e.flux, e.group, e.emitter, rng});
+    paths.back().disk_centre = e.disk_centre, paths.back().disk_radius = e.disk_radius;
+    paths.back().shadows = e.shadows;
     ids.push_back(i);
   }
   std::vector<RayHit> rays;
@@ -51,7 +56,7 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
       if ((seen_by & kDiffuseRay) == 0) continue;  // it stops the light, and nobody sees it
       const SurfaceInteraction at = scene.interaction(rays[i]);
       path.flux *= at.bsdf.transmittance_to(at.t, path.absorption);
-      if ((path.kind & ~seen_by & kShadowRay) != 0) {
+      if ((path.kind & kShadowRay) != 0 && (!path.shadows || (seen_by & kShadowRay) == 0)) {
         // Lit, and no shadow behind it: half of the paths stay, half go on.
         path.flux = path.flux * 2.0f;
         if (path.rng.next_float() < 0.5f) {
@@ -59,6 +64,11 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
           paths[alive] = path, ids[alive++] = ids[i];
           continue;
         }
+      }
+      float lit = 1.0f;  // share of the light that a facing disk gives at this distance
+      if (path.disk_radius > 0.0f) {
+        const float d2 = length2(at.position - path.disk_centre);
+        lit = d2 / (d2 + path.disk_radius * path.disk_radius);
       }
       Vpl light;
       light.position = at.position, light.kind = VplKind::oriented, light.normal = at.bsdf.normal();
@@ -74,13 +84,13 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
         }
         vpls.push_back({ids[i], path.emitter, light});
       };
-      leave(at.bsdf.lambertian_intensity(path.flux));
+      leave(at.bsdf.lambertian_intensity(path.flux * lit));
       light.normal = -light.normal;
-      leave(at.bsdf.passed_intensity(path.flux));
+      leave(at.bsdf.passed_intensity(path.flux * lit));
       const auto next = at.bsdf.scatter(path.rng);
       if (!next) continue;
       if ((next->flags & kStraight) == 0 && ++path.met >= options.max_depth) continue;
-      if ((next->flags & kStraight) == 0) path.kind = kDiffuseRay;
+      if ((next->flags & kStraight) == 0) path.kind = kDiffuseRay, path.flux *= lit, path.disk_radius = 0.0f;
       path.absorption = at.bsdf.absorption_after(next->flags, path.absorption);
       path.origin = at.bsdf.origin(next->flags), path.direction = next->direction;
       path.flux = path.flux * next->weight * next->factor;

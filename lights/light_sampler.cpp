@@ -53,6 +53,7 @@ void LightSampler::add_lights(std::vector<double>& weights, const Progress* prog
       Vpl v;
       v.group = l.group;
       v.intensity = l.value;
+      v.ray_mask = shadow_mask(l);
       const auto stands = [&](const Vpl& vpl) {
         if (extended) return;
         delta_.push_back(vpl), delta_emitter_.push_back(added ? static_cast<uint32_t>(sampler_.size() - 1) : kNoId);
@@ -65,13 +66,13 @@ void LightSampler::add_lights(std::vector<double>& weights, const Progress* prog
             stands(profiled(l, *profile));
             break;
           }
-          add(l.radius > 0 ? Kind::sphere : Kind::point, i, 4 * std::numbers::pi * value, l.radius > 0);
+          add(l.radius > 0 ? l.facing ? Kind::soft : Kind::sphere : Kind::point, i, 4 * std::numbers::pi * value,
+              l.radius > 0);
           if (!(l.radius > 0)) v.position = l.position, stands(v);
           break;
         case LightType::spot:
-          // A spot's sphere blurs the edge of its shadows alone; it is taken as a point here.
-          add(Kind::spot, i, value * profile_solid_angle(spot_of(l)), false);
-          stands(spot_of(l));
+          add(l.radius > 0 ? Kind::soft : Kind::spot, i, value * profile_solid_angle(spot_of(l)), l.radius > 0);
+          if (!(l.radius > 0)) stands(spot_of(l));
           break;
         case LightType::rectangle:
         case LightType::disk: {
@@ -286,7 +287,7 @@ MeshLight mesh_light(const Mesh& mesh) {
 
 bool LightSampler::found_by_rays(const Emitter& e) const {
   if (e.kind == Kind::triangle) return mesh_light(scene_.meshes()[e.index]) == MeshLight::by_samples_and_rays;
-  return e.kind != Kind::sphere && e.kind != Kind::sun;
+  return e.kind != Kind::sphere && e.kind != Kind::soft && e.kind != Kind::sun;
 }
 
 double LightSampler::mesh_density(const SurfaceHit& surface) const {

@@ -24,6 +24,10 @@ struct EmittedRay {
   Rgb flux{};               // W that the path carries, already divided by its probability
   uint32_t group = 0;
   uint32_t emitter = 0;  // as LightSampler counts all
+  // Of a disk that faces what it lights: from there light falls by d²/(d² + r²).
+  Vec3f disk_centre{};
+  float disk_radius = 0.0f;
+  bool shadows = true;
 };
 
 // A virtual light that stands for emitters that are not points.
@@ -63,7 +67,7 @@ class LightSampler {
   const std::vector<uint32_t>& delta_emitters() const { return delta_emitter_; }
   // True where some emitter beside the environment has extent, and so needs many VPLs for its direct light.
   bool has_extended() const { return extended_ < sampler_.size(); }
-  // Those emitters by number; what they are, empty for suns; and how large a part of the surface (m², one side) each of
+  // Those emitters by number; what they are, empty for suns and for lamps with a radius but even spheres; and how large a part of the surface (m², one side) each of
   // `count` VPLs stands for. `s`: of shape(i), here and below.
   size_t extended_count() const { return sampler_.size() - extended_; }
   std::optional<EmitterShape> shape(size_t i) const;
@@ -109,7 +113,7 @@ class LightSampler {
   size_t bytes() const;
 
  private:
-  enum class Kind : uint8_t { point, spot, profile, sphere, rectangle, disk, sun, environment, triangle };
+  enum class Kind : uint8_t { point, spot, profile, sphere, soft, rectangle, disk, sun, environment, triangle };
   struct Emitter {
     Kind kind;
     uint32_t index;     // light, or mesh

@@ -3,6 +3,7 @@
 
 #include "lights/light_sampler.h"
 #include "lights/light_vpls.h"
+#include "lights/soft_lamp.h"
 
 namespace lumicut {
 
@@ -13,6 +14,11 @@ namespace {
 Vec2f random_pair(Rng& rng) {
   const float y = rng.next_float(), x = rng.next_float();
   return {x, y};
+}
+
+Vec3f random_place(Rng& rng) {
+  const float u = rng.next_float(), v = rng.next_float(), w = rng.next_float();
+  return place_in_ball(u, v, w);
 }
 
 constexpr float kPi = std::numbers::pi_v<float>;
@@ -169,12 +175,18 @@ LightSampler::ExtendedSample LightSampler::extended_light(const Emitter& e, floa
     const Light& l = scene_.lights()[e.index];
     Vpl v;
     v.kind = VplKind::directional, v.normal = sample_sun(l, rng), v.intensity = l.value * weight, v.group = l.group;
+    v.ray_mask = shadow_mask(l);
+    return {v, 0.0f, 0.0f};
+  }
+  if (e.kind == Kind::soft) {
+    Vpl v = soft_lamp(scene_.lights()[e.index], random_place(rng));
+    v.intensity *= weight;
     return {v, 0.0f, 0.0f};
   }
   const Surface s = sample_surface(e, rng);
   const uint32_t group = e.kind == Kind::triangle ? scene_.meshes()[e.index].group : scene_.lights()[e.index].group;
   Vpl v = oriented(s.position, s.normal, s.radiance * (weight / s.area_pdf), group);
-  if (e.kind != Kind::triangle) spread(scene_.lights()[e.index], v);
+  if (e.kind != Kind::triangle) spread(scene_.lights()[e.index], v), v.ray_mask = shadow_mask(scene_.lights()[e.index]);
   return {v, s.area_pdf, s.offset};
 }
 
@@ -251,6 +263,18 @@ EmittedRay LightSampler::sample_ray(Rng& rng, const DiscreteDistribution* chance
              l.group};
       break;
     }
+    case Kind::soft: {
+      const Light& l = scene_.lights()[e.index];
+      const Vpl v = soft_lamp(l, random_place(rng));
+      const Vec2f at = random_pair(rng);
+      const Vec3f local = uniform_cone(v.cos_outer(), at.x, at.y);
+      const Vec3f direction = Frame(l.direction).to_world(local);
+      // From the disk that faces its way: a lamp at a ceiling shines from below it.
+      ray = {v.position - direction * dot(direction, v.from_centre), direction,
+             l.value * (spot_falloff(v, local.z) * 2.0f * kPi * (1.0f - v.cos_outer())), l.group};
+      if (l.facing) ray.disk_centre = l.position, ray.disk_radius = l.radius;
+      break;
+    }
     case Kind::profile: {
       const Light& l = scene_.lights()[e.index];
       const LightProfile& profile = *scene_.profiles().find(l.profile);
@@ -298,6 +322,7 @@ EmittedRay LightSampler::sample_ray(Rng& rng, const DiscreteDistribution* chance
     }
   }
   ray.flux = ray.flux * weight, ray.emitter = static_cast<uint32_t>(i);
+  if (e.kind != Kind::triangle && e.kind != Kind::environment) ray.shadows = scene_.lights()[e.index].shadows;
   return ray;
 }
 

@@ -25,16 +25,29 @@ inline bool narrowed(const Light& light) {
          light.spread < std::numbers::pi_v<float> - 1e-4f;
 }
 
+inline uint32_t shadow_mask(const Light& l) { return l.shadows ? uint32_t{kShadowRay} : 0u; }
+
 inline Vpl spot_of(const Light& l) {
   Vpl v;
+  v.ray_mask = shadow_mask(l);
   v.kind = VplKind::spot, v.position = l.position, v.normal = l.direction, v.intensity = l.value, v.group = l.group;
   v.cos_outer() = l.cos_outer, v.blend_cosine = l.blend_cosine, v.spot_cosine = l.spot_cosine ? 1.0f : 0.0f;
+  return v;
+}
+
+// A place, in units of its radius, of a lamp that has one. A point lamp is a spot that is open all around.
+inline Vpl soft_lamp(const Light& l, const Vec3f& place) {
+  Vpl v = spot_of(l);
+  if (l.type == LightType::point) v.cos_outer() = -1.0f, v.blend_cosine = v.spot_cosine = 0.0f;
+  v.from_centre = place * l.radius, v.position += v.from_centre;
+  v.lamp_radius = l.radius, v.facing = l.facing;
   return v;
 }
 
 // A point light with a measured profile.
 inline Vpl profiled(const Light& l, const LightProfile& profile) {
   Vpl v;
+  v.ray_mask = shadow_mask(l);
   v.kind = VplKind::spot, v.position = l.position, v.normal = l.direction, v.intensity = l.value, v.group = l.group;
   v.profile = l.profile, v.cos_outer() = profile.cos_outer();
   v.blend_cosine = l.tangent.x, v.spot_cosine = l.tangent.y, v.spread_tan = l.tangent.z;

@@ -34,8 +34,12 @@ struct Vpl {
   float offset = 0.0f;  // how far shadow rays that start at it stand off its surface
   float cell = 0.0f;    // m² of surface that it stands for; 0: exactly its point, or distant
   float clamp2 = 0.0f;  // squared distance below which no point comes nearer
+  // Spot: one place of a lamp with a radius. [lights/soft_lamp.h]
+  Vec3f from_centre{};
+  float lamp_radius = 0.0f;  // 0: a point
+  uint32_t facing = 0;  // 1: its disk faces what it lights; else a sphere. (No bool: lights are compared by bytes.)
   LUMICUT_FIELDS(Vpl, position, kind, normal, group, intensity, edge_or_radius, blend_cosine, spot_cosine, spread_tan,
-                 profile, ray_mask, offset, cell, clamp2)
+                 profile, ray_mask, offset, cell, clamp2, from_centre, lamp_radius, facing)
 
   // Spot: the cosine at which it has fallen to 0.
   float cos_outer() const { return edge_or_radius; }

@@ -4,6 +4,7 @@
 #include "plugin/check.h"
 #include "plugin/descriptors.h"
 #include "plugin/extensions.h"
+#include "plugin/include/lumicut/lumicut_hits.h"
 #include "plugin/include/lumicut/lumicut_lights.h"
 #include "plugin/include/lumicut/lumicut_state.h"
 #include "plugin/objects.h"
@@ -21,6 +22,7 @@ const char* lumicut_last_error() { return last_error(); }
 
 const void* lumicut_get_extension(const char* id) {
   if (id == nullptr) return nullptr;
+  if (std::strcmp(id, LUMICUT_HITS_EXTENSION) == 0) return hits_extension();
   if (std::strcmp(id, LUMICUT_LIGHTS_EXTENSION) == 0) return lights_extension();
   if (std::strcmp(id, LUMICUT_STATE_EXTENSION) == 0) return state_extension();
   return nullptr;

@@ -15,8 +15,35 @@ namespace {
 
 constexpr char kMagic[8] = {'L', 'U', 'M', 'I', 'C', 'U', 'T', 'S'};
 constexpr char kIntegrator[] = "integrator";
-constexpr uint32_t kVersion = 4, kByteOrder = 0x01020304u;
-constexpr uint64_t kLightBytes = sizeof(lumicut_vpl) + sizeof(lumicut_vpl_origin);
+constexpr uint32_t kVersion = 5, kByteOrder = 0x01020304u;
+// Of a light that stands for a place of a lamp, what no host needs to know.
+struct Lamp {
+  Vec3f from_centre;
+  float radius;
+  uint32_t facing, ray_mask;
+};
+constexpr uint64_t kLightBytes = sizeof(lumicut_vpl) + sizeof(lumicut_vpl_origin) + sizeof(Lamp);
+
+std::vector<Lamp> lamps_of(const VplSet& set) {
+  std::vector<Lamp> lamps(set.lights.size());
+  for (size_t i = 0; i < lamps.size(); ++i) {
+    const Vpl& v = set.lights[i];
+    lamps[i] = {v.from_centre, v.lamp_radius, v.facing ? 1u : 0u, v.ray_mask};
+  }
+  return lamps;
+}
+
+// Lights keep their order: those of emitters were first when they were saved.
+void take_lamps(const std::vector<Lamp>& lamps, VplSet& set) {
+  for (size_t i = 0; i < lamps.size(); ++i) {
+    const Lamp& lamp = lamps[i];
+    Vpl& v = set.lights[i];
+    if (!is_finite(lamp.from_centre) || !(lamp.radius >= 0.0f) || std::isinf(lamp.radius) || lamp.facing > 1)
+      fail_argument("lamp " + number_text(uint64_t{i}) + " is none");
+    v.from_centre = lamp.from_centre, v.lamp_radius = lamp.radius, v.facing = lamp.facing != 0,
+    v.ray_mask = lamp.ray_mask;
+  }
+}
 
 // Followed by what it was made for as text, the lights, their origins, and the method's own bytes.
 struct Header {
@@ -80,6 +107,7 @@ std::vector<uint8_t> save(lumicut_integrator_t& i) {
   append(key.data(), key.size());
   append(lights.lights.data(), h.lights * sizeof(lumicut_vpl));
   append(lights.origins.data(), h.lights * sizeof(lumicut_vpl_origin));
+  append(lamps_of(*p.vpls).data(), h.lights * sizeof(Lamp));
   append(own.data(), own.size());
   h.checksum = checksum(h, out.data() + sizeof(h), out.size() - sizeof(h));
   std::memcpy(out.data(), &h, sizeof(h));
@@ -125,11 +153,13 @@ void load(lumicut_integrator_t& i, lumicut_scene_t& s, const uint8_t* bytes, uin
     if (h.lights > 0) std::memcpy(array.data(), at, h.lights * sizeof(array[0]));
     at += h.lights * sizeof(array[0]);
   };
-  read(saved.lights), read(saved.origins);
+  std::vector<Lamp> lamps;
+  read(saved.lights), read(saved.origins), read(lamps);
   saved.light_paths = h.light_paths, saved.emitter_samples = h.emitter_samples;
   std::shared_ptr<VplSet> vpls;
   try {
     vpls = std::make_shared<VplSet>(to_vpls(saved.view(), s.scene.profiles()));
+    take_lamps(lamps, *vpls);
   } catch (const Error& error) {
     fail_bytes(std::string("a light in it makes no sense: ") + error.what());
   }

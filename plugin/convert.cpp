@@ -90,7 +90,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   const FieldValidator c("lumicut_material", index);
   c.flags("flags", in.flags,
           LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG | LUMICUT_GGX | LUMICUT_NO_FRESNEL | LUMICUT_BURLEY |
-              LUMICUT_SHADOWS_PASS | LUMICUT_HOLDOUT);
+              LUMICUT_SHADOWS_PASS | LUMICUT_HOLDOUT | LUMICUT_BUMP_SHADOWS);
   if ((in.flags & LUMICUT_PHONG) != 0 && (in.flags & LUMICUT_GGX) != 0)
     c.fail("flags", "holds both LUMICUT_PHONG and LUMICUT_GGX");
   if ((in.flags & LUMICUT_NO_FRESNEL) != 0) {
@@ -131,6 +131,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   m.burley = (in.flags & LUMICUT_BURLEY) != 0;
   m.shadows_pass = (in.flags & LUMICUT_SHADOWS_PASS) != 0;
   m.holdout = (in.flags & LUMICUT_HOLDOUT) != 0;
+  m.bump_shadows = (in.flags & LUMICUT_BUMP_SHADOWS) != 0;
   c.range("specular_tint", in.specular_tint, 0.0f, 1.0f);
   if (max_component(vec(in.specular_tint)) > 0.0f) m.specular_tint = vec(in.specular_tint);
   c.not_negative("absorption", in.absorption);
@@ -270,6 +271,10 @@ Light to_light(const lumicut_light& in, uint64_t index, const std::vector<Profil
   if (point || spot) c.range("radius", in.radius, 0.0f, kLargestCoordinate);
   if (sun) c.range("radius", in.radius, 0.0f, 0.5f * kPi);
   if (!area) light.radius = in.radius;
+  c.flags("flags", in.flags, LUMICUT_FACING_DISK | LUMICUT_NO_SHADOWS);
+  light.facing = (in.flags & LUMICUT_FACING_DISK) != 0, light.shadows = (in.flags & LUMICUT_NO_SHADOWS) == 0;
+  if (light.facing && !point && !spot)
+    c.fail("flags", std::string("LUMICUT_FACING_DISK is not for a ") + type_name(in.type));
   if (spot || sun) light.direction = c.direction("direction", in.direction);
   if (spot) {
     c.range("angle", in.angle, kMinAngle, kPi + 1e-5f);
@@ -350,9 +355,37 @@ Environment to_environment(const lumicut_environment& in) {
   return e;
 }
 
+namespace {
+
+void read_panorama(const FieldValidator& c, const lumicut_camera& in, Camera& camera) {
+  camera.panorama = static_cast<Camera::Panorama>(in.panorama);
+  if (in.lens_radius != 0.0f)
+    c.fail("lens_radius", number_text(in.lens_radius) + " is not 0, but panorama is not either");
+  if (in.panorama == LUMICUT_EQUIRECTANGULAR) {
+    const bool whole = in.longitude[0] == 0 && in.longitude[1] == 0 && in.latitude[0] == 0 && in.latitude[1] == 0;
+    if (whole) return;
+    for (int k = 0; k < 2; ++k) {
+      c.range("longitude", in.longitude[k], -kPi - 1e-5f, kPi + 1e-5f, k);
+      c.range("latitude", in.latitude[k], -0.5f * kPi - 1e-5f, 0.5f * kPi + 1e-5f, k);
+      camera.longitude[k] = in.longitude[k], camera.latitude[k] = in.latitude[k];
+    }
+    return;
+  }
+  c.range("fisheye_fov", in.fisheye_fov, kMinAngle, 2.0f * kPi + 1e-5f);
+  camera.fisheye_fov = in.fisheye_fov;
+  if (in.panorama == LUMICUT_FISHEYE_EQUIDISTANT) return;
+  c.range("fisheye_lens", in.fisheye_lens, std::numeric_limits<float>::min(), kLargestCoordinate);
+  for (int k = 0; k < 2; ++k) c.range("sensor", in.sensor[k], std::numeric_limits<float>::min(), kLargestCoordinate, k);
+  camera.fisheye_lens = in.fisheye_lens, camera.sensor_width = in.sensor[0], camera.sensor_height = in.sensor[1];
+}
+
+}  // namespace
+
 Camera to_camera(const lumicut_camera& in) {
   const FieldValidator c("lumicut_camera");
   c.integer("orthographic", in.orthographic, 0, 1);
+  c.integer("panorama", in.panorama, 0, LUMICUT_FISHEYE_EQUISOLID);
+  if (in.orthographic != 0 && in.panorama != 0) c.fail("panorama", "is not 0, but orthographic is not either");
   for (int k = 0; k < 12; ++k) c.finite("to_world", in.to_world[k], k);
   for (const int k : {3, 7, 11}) c.coordinate("to_world", in.to_world[k], k);
   const auto column = [&](int k) { return Vec3d{in.to_world[k], in.to_world[4 + k], in.to_world[8 + k]}; };
@@ -374,6 +407,8 @@ Camera to_camera(const lumicut_camera& in) {
   if (camera.orthographic) {
     c.range("height", in.height, std::numeric_limits<float>::min(), kLargestCoordinate);
     camera.height = in.height;
+  } else if (in.panorama != 0) {
+    read_panorama(c, in, camera);
   } else {
     c.range("fov_y", in.fov_y, 1e-4f, kPi - 1e-4f);
     camera.tan_half_fov_y = static_cast<float>(std::tan(0.5 * in.fov_y));
@@ -565,6 +600,18 @@ std::vector<uint64_t> append_points(const Scene& scene, const lumicut_point* poi
   return starts;
 }
 
+static PixelFilter to_filter(const FieldValidator& c, const lumicut_render_desc& in) {
+  c.integer("filter", in.filter, LUMICUT_BOX, LUMICUT_BLACKMAN_HARRIS);
+  PixelFilter filter;
+  filter.kind = static_cast<PixelFilter::Kind>(in.filter);
+  if (filter.kind != PixelFilter::Kind::box) filter.width = 1.5f;
+  if (in.filter_width == 0.0f) return filter;
+  const bool box = filter.kind == PixelFilter::Kind::box;
+  c.range("filter_width", in.filter_width, box ? 1.0f : 0.01f, box ? 1.0f : 10.0f);
+  filter.width = in.filter_width;
+  return filter;
+}
+
 FrameOptions to_frame_options(const lumicut_render_desc& in) {
   const FieldValidator c("lumicut_render_desc");
   c.integer("width", in.width, 1, 65536);
@@ -576,6 +623,7 @@ FrameOptions to_frame_options(const lumicut_render_desc& in) {
   o.samples = in.samples == 0 ? 1 : in.samples;
   o.illuminance = (in.flags & LUMICUT_ILLUMINANCE) != 0;
   o.denoise = (in.flags & LUMICUT_DENOISE) != 0;
+  o.filter = to_filter(c, in);
   // A batch holds at least a tile's samples: tiles shrink rather than let memory grow with the samples.
   const auto tile_points = [&] { return uint64_t{o.tile_size} * o.tile_size * o.samples; };
   o.tile_size = in.tile_size == 0 ? 64 : in.tile_size;

@@ -51,12 +51,13 @@ LUMICUT_DESCRIPTOR(lumicut_mesh, F(struct_size), F(mask), F(positions), F(normal
                    F(attributes), F(attribute_count));
 LUMICUT_DESCRIPTOR(lumicut_light, F(struct_size), F(type), F(unit), F(group), F(color), F(value), F(position),
                    F(radius), F(direction), F(angle), F(u), F(blend), F(v), F(spread), F(spot_cosine), F(profile),
-                   F(tangent));
+                   F(tangent), F(flags));
 LUMICUT_DESCRIPTOR(lumicut_profile, F(struct_size), F(vertical_count), F(horizontal_count), F(reserved), F(vertical),
                    F(horizontal), F(values));
 LUMICUT_DESCRIPTOR(lumicut_environment, F(struct_size), F(group), F(color), F(texture), F(world_to_map), F(flags));
 LUMICUT_DESCRIPTOR(lumicut_camera, F(struct_size), F(orthographic), F(to_world), F(fov_y), F(height), F(shift),
-                   F(near_clip), F(far_clip), F(pixel_aspect), F(lens_radius), F(focus_distance));
+                   F(near_clip), F(far_clip), F(pixel_aspect), F(lens_radius), F(focus_distance), F(panorama),
+                   F(fisheye_fov), F(fisheye_lens), F(sensor), F(longitude), F(latitude));
 LUMICUT_DESCRIPTOR(lumicut_trace, F(struct_size), F(batch), F(intersect), F(occluded), F(user));
 LUMICUT_DESCRIPTOR(lumicut_integrator_info, F(struct_size), F(param_count), F(id), F(label), F(description), F(source),
                    F(traits), F(reserved), F(interactive), F(preview), F(draft), F(good), F(reference));
@@ -64,7 +65,7 @@ LUMICUT_DESCRIPTOR(lumicut_param_info, F(struct_size), F(type), F(id), F(label),
                    F(default_text), F(minimum), F(maximum));
 LUMICUT_DESCRIPTOR(lumicut_render_desc, F(struct_size), F(width), F(height), F(samples), F(crop), F(tile_size),
                    F(passes), F(max_seconds), F(target_error), F(confidence), F(flags), F(checkpoint),
-                   F(checkpoint_size));
+                   F(checkpoint_size), F(filter), F(filter_width));
 LUMICUT_DESCRIPTOR(lumicut_tile, F(struct_size), F(x0), F(y0), F(x1), F(y1));
 LUMICUT_DESCRIPTOR(lumicut_channel_info, F(struct_size), F(components), F(name), F(description));
 

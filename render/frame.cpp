@@ -6,6 +6,7 @@
 
 #include "core/parallel.h"
 #include "core/rng.h"
+#include "render/camera_rays.h"
 #include "render/clamp_compensation.h"
 #include "render/denoising_features.h"
 #include "render/traced_gloss.h"
@@ -23,17 +24,6 @@ uint32_t even_bits(uint32_t x) {
   return (x | x >> 8) & 0x0000ffffu;
 }
 
-// Point i of a sequence that fills the unit square evenly for any count. [Roberts 2018]
-Vec2f rank1(uint64_t i, Vec2f shift, double step_x, double step_y) {
-  const auto at = static_cast<double>(i);
-  const double x = 0.5 + shift.x + at * step_x, y = 0.5 + shift.y + at * step_y;
-  return {static_cast<float>(x - std::floor(x)), static_cast<float>(y - std::floor(y))};
-}
-// R2 in the pixel; on the lens two steps of R4, which no whole numbers relate to those: together they fill all four
-// dimensions.
-Vec2f in_pixel(uint64_t i, Vec2f shift) { return rank1(i, shift, 0.7548776662466927, 0.5698402909980532); }
-Vec2f on_lens(uint64_t i, Vec2f shift) { return rank1(i, shift, 0.8566748838545029, 0.7338918566271260); }
-
 // Of radiation weighted by luminance, by convention: what 555 nm has. [docs/units.md]
 constexpr float kLumenPerWatt = 683.0f;
 
@@ -48,9 +38,9 @@ struct PixelSums {
 class Batch {
  public:
   // `surfaces`: where anything of the scene may be specular.
-  Batch(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options,
+  Batch(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options, const CameraRays& camera,
         const LightSurfaces* surfaces)
-      : scene_(scene), methods_(methods), options_(options), light_surfaces_(surfaces) {}
+      : scene_(scene), methods_(methods), options_(options), camera_(camera), light_surfaces_(surfaces) {}
 
   void add_tile(const Rect& tile) {
     tiles_.push_back(tile);
@@ -80,12 +70,14 @@ class Batch {
       std::vector<RayHit> rays((end - begin) * samples);
       std::vector<float> cosines(rays.size());
       for (size_t p = begin; p < end; ++p)
-        camera_rays(p, rays.data() + (p - begin) * samples, cosines.data() + (p - begin) * samples);
+        camera_.of_pixel(pixels_[p].x, pixels_[p].y, rays.data() + (p - begin) * samples,
+                         cosines.data() + (p - begin) * samples);
       if (!scene_.bounds().empty()) scene_.accel().intersect(rays);
       std::vector<FeatureTracer::Way> ways;
       for (size_t i = 0; i < rays.size(); ++i) {
         const size_t p = begin + i / samples;
         const size_t at = begin * samples + i;
+        if (rays[i].ray.mask == 0) continue;
         if (rays[i].hit.geom == kNoId) {
           miss(rays[i], p);
           if (features_) features_->miss(static_cast<uint32_t>(p), rays[i].ray.dir);
@@ -267,25 +259,6 @@ class Batch {
     }
   }
 
-  void camera_rays(size_t p, RayHit* rays, float* cosines) const {
-    const auto [x, y] = pixels_[p];
-    const auto [seed, first] = options_.camera_samples.value_or(FrameOptions::CameraSamples{options_.seed, 0});
-    Rng rng(seed, Stage::camera, x, y);
-    // One sample lies at the centre; more are shifted by a random vector of the pixel's own.
-    const bool centred = options_.samples == 1 && !options_.camera_samples;
-    const Vec2f shift = centred ? Vec2f{0, 0} : Vec2f{rng.next_float(), rng.next_float()};
-    const Vec2f lens_shift = {rng.next_float(), rng.next_float()};
-    for (uint32_t s = 0; s < options_.samples; ++s) {
-      const Vec2f at = in_pixel(first + s, shift), lens = on_lens(first + s, lens_shift);
-      const Camera::Sample c = scene_.camera().generate(static_cast<float>(x) + at.x, static_cast<float>(y) + at.y,
-                                                        static_cast<float>(options_.width),
-                                                        static_cast<float>(options_.height), lens.x, lens.y);
-      rays[s].ray.org = c.origin, rays[s].ray.dir = c.direction, rays[s].ray.tnear = c.tnear, rays[s].ray.tfar = c.tfar;
-      rays[s].ray.mask = kCameraRay;
-      cosines[s] = c.forward_cosine;
-    }
-  }
-
   static void see(PixelSums& sum, uint32_t group, const Rgb& radiance) {
     if (!(max_component(radiance) > 0.0f)) return;
     for (auto& [of, light] : sum.seen)
@@ -324,6 +297,7 @@ class Batch {
   const Scene& scene_;
   const std::span<const GroupMethod> methods_;
   const FrameOptions& options_;
+  const CameraRays& camera_;
   const LightSurfaces* const light_surfaces_;
   std::vector<Rect> tiles_;
   std::vector<Pixel> pixels_;
@@ -381,6 +355,7 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
     batches.emplace_back(first, last);
     first = last;
   }
+  const CameraRays camera(scene.camera(), options);
   std::optional<LightSurfaces> light_surfaces;
   if (scene.may_be_specular()) light_surfaces.emplace(scene);
   std::optional<ClampCompensation> compensation;
@@ -392,7 +367,7 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
       [&](const tbb::blocked_range<size_t>& range) {
         for (size_t b = range.begin(); b < range.end(); ++b) {
           context.progress.check();
-          Batch batch(scene, methods, options, light_surfaces ? &*light_surfaces : nullptr);
+          Batch batch(scene, methods, options, camera, light_surfaces ? &*light_surfaces : nullptr);
           for (size_t t = batches[b].first; t < batches[b].second; ++t) batch.add_tile(tiles[t]);
           batch.collect(context);
           batch.shade(light.nearby, compensation ? &*compensation : nullptr, context);

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "film/film.h"
+#include "film/pixel_filter.h"
 #include "integrators/integrator.h"
 #include "render/clamp.h"
 #include "render/nearby_lights.h"
@@ -24,7 +25,9 @@ struct FrameOptions {
   std::optional<CameraSamples> camera_samples;
   bool illuminance = false;  // fill that channel: about as long again
   bool denoise = false;      // fill the channels of denoising
-  LUMICUT_FIELDS(FrameOptions, width, height, samples, tile_size, crop, seed, camera_samples, illuminance, denoise)
+  PixelFilter filter;
+  LUMICUT_FIELDS(FrameOptions, width, height, samples, tile_size, crop, seed, camera_samples, illuminance, denoise,
+                 filter)
 };
 
 // Tiles of the crop in the order they are rendered.

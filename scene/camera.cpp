@@ -2,7 +2,31 @@
 
 namespace lumicut {
 
+// u from left to right, v from below to above, both in [0,1]. [the projections of Cycles, which follow Paul Bourke's]
+Camera::Sample Camera::panoramic(float u, float v) const {
+  Sample s{position, forward, near_clip, far_clip, 1.0f};
+  if (panorama == Panorama::equirectangular) {
+    const float phi = longitude[0] + (longitude[1] - longitude[0]) * u;
+    const float theta = latitude[0] + (latitude[1] - latitude[0]) * v;
+    s.direction = (forward * std::cos(phi) + right * std::sin(phi)) * std::cos(theta) + up * std::sin(theta);
+    return s;
+  }
+  const bool equisolid = panorama == Panorama::fisheye_equisolid;
+  const float x = (u - 0.5f) * (equisolid ? sensor_width : 2.0f), y = (v - 0.5f) * (equisolid ? sensor_height : 2.0f);
+  const float r = std::sqrt(x * x + y * y),
+              most = equisolid ? 2.0f * fisheye_lens * std::sin(0.25f * fisheye_fov) : 1.0f;
+  if (r > most) {
+    s.outside = true;
+    return s;
+  }
+  if (!(r > 0.0f)) return s;
+  const float theta = equisolid ? 2.0f * std::asin(std::min(1.0f, r / (2.0f * fisheye_lens))) : 0.5f * fisheye_fov * r;
+  s.direction = forward * std::cos(theta) + (right * (x / r) + up * (y / r)) * std::sin(theta);
+  return s;
+}
+
 Camera::Sample Camera::generate(float x, float y, float width, float height_px, float lens_u, float lens_v) const {
+  if (panorama != Panorama::none) return panoramic(x / width, 1.0f - y / height_px);
   // Image plane in units of the image's height, centre 0, y up.
   const float sx = (x - 0.5f * width) * pixel_aspect / height_px + shift_x;
   const float sy = 0.5f - y / height_px + shift_y;

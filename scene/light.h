@@ -17,7 +17,7 @@ struct Light {
   Rgb value{};  // intensity W/sr (point, spot: on the axis), radiance W/(sr·m²) (rectangle, disk), irradiance W/m²
                 // (sun)
   Vec3f position{};
-  float radius = 0.0f;        // point, spot: emitting sphere; sun: angular radius, radians
+  float radius = 0.0f;        // point, spot: emitting sphere or disk; sun: angular radius, radians
   Vec3f direction{0, 0, -1};  // unit; spot: axis; sun: the way light travels
   float cos_outer = 0.0f;     // spot: cosine of half the opening angle
   float blend_cosine = 0.0f;  // spot: smoothstep over this much of cosine; 0: sharp
@@ -26,8 +26,10 @@ struct Light {
   float spread = 3.14159265f;  // rectangle, disk: opening angle; π: Lambertian
   uint32_t profile = 0;  // point: id of a LightProfile [scene/light_profile.h] about `direction`, `value` its largest
   Vec3f tangent{};       // profile: unit, where its horizontal angle 0 lies; orthogonal to `direction`
+  bool facing = false;   // point, spot: its disk faces what it lights; else a sphere
+  bool shadows = true;   // false: nothing stands before it
   LUMICUT_FIELDS(Light, type, group, value, position, radius, direction, cos_outer, blend_cosine, spot_cosine, u, v,
-                 spread, profile, tangent)
+                 spread, profile, tangent, facing, shadows)
 };
 
 struct Environment {

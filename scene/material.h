@@ -26,6 +26,7 @@ struct Material {
   float coat = 0.0f, coat_roughness = 0.0f, coat_ior = 1.5f;  // a clear layer over all of this; `coat`: its share
   bool shadows_pass = false;  // light goes straight through the glass, though the camera sees it bent
   Rgb absorption{};           // inside glass, for each unit of length
+  bool bump_shadows = false;  // bsdf/bump_shadow.h, where normals are bent
   bool holdout = false;       // the camera sees nothing there, and nothing behind
   float opacity = 1.0f;
   Rgb emission{};  // radiance, W/(sr·m²), from the side the geometric normal points to
@@ -38,9 +39,9 @@ struct Material {
   int32_t diffuse_texture = -1, specular_texture = -1, opacity_texture = -1, emission_texture = -1;
   int32_t translucency_texture = -1;
   LUMICUT_FIELDS(Material, diffuse, specular, translucency, shininess, lobe, fresnel, burley, specular_tint, roughness,
-                 metallic, ior, transmission, coat, coat_roughness, coat_ior, shadows_pass, absorption, holdout,
-                 opacity, emission, emit_both_sides, normal_strength, normal_texture, bump_strength, bump_distance,
-                 height_texture, roughness_texture, metallic_texture, diffuse_texture, specular_texture,
+                 metallic, ior, transmission, coat, coat_roughness, coat_ior, shadows_pass, absorption, bump_shadows,
+                 holdout, opacity, emission, emit_both_sides, normal_strength, normal_texture, bump_strength,
+                 bump_distance, height_texture, roughness_texture, metallic_texture, diffuse_texture, specular_texture,
                  opacity_texture, emission_texture, translucency_texture)
 
   // Whether light that goes straight through its glass is absorbed there.

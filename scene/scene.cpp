@@ -448,6 +448,7 @@ SurfaceHit Scene::surface(const RayHit& rh, bool turn_normal) const {
     n = normalize(n);
     if (n != Vec3f{}) s.normal = dot(n, s.geometric_normal) < 0.0f ? -n : n;
   }
+  const Vec3f smooth = s.normal;
   if (!mesh.uvs.empty()) {
     const Vec2f a = mesh.uvs[tri[0]], b = mesh.uvs[tri[1]], c = mesh.uvs[tri[2]];
     s.uv = {a.x * w + b.x * hit.u + c.x * hit.v, a.y * w + b.y * hit.u + c.y * hit.v};
@@ -459,6 +460,7 @@ SurfaceHit Scene::surface(const RayHit& rh, bool turn_normal) const {
   if (const int32_t turned = materials_[s.material].normal_texture; turned >= 0 && turn_normal)
     if (const TextureProgram* program = textures_[turned].program())
       s.normal = programmed_normal(*program, s, -rh.ray.dir);
+  if (materials_[s.material].bump_shadows && s.normal != smooth) s.smooth = smooth;
   return s;
 }
 
@@ -532,7 +534,7 @@ Vec3f Scene::mapped_normal(const Material& material, const SurfaceHit& hit, cons
 }
 
 SurfaceInteraction Scene::interaction(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const {
-  const SurfaceView view{hit.position, hit.geometric_normal, hit.normal, to_viewer, hit.offset, pixel};
+  const SurfaceView view{hit.position, hit.geometric_normal, hit.normal, to_viewer, hit.offset, pixel, hit.smooth};
   return {hit, emitted(hit, to_viewer), bsdf_parameters(hit.material, hit.uv, view, &hit), view};
 }
 

@@ -10,6 +10,7 @@ struct SurfaceHit {
   Vec3f position;          // on the surface
   Vec3f geometric_normal;  // unit, the mesh's front side
   Vec3f normal;            // unit shading normal, on the geometric normal's side
+  Vec3f smooth{};          // what it was before a texture bent it, where that dims; else 0
   Vec2f uv;
   uint32_t material = 0, mesh = 0, triangle = 0, instance = 0;  // `instance`: of its mesh
   float u = 0.0f, v = 0.0f;                                     // barycentric, as Hit has them

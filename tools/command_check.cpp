@@ -59,6 +59,7 @@ void check_scene(const Options& o) {
   desc.width = size.empty() ? data.width : size[0];
   desc.height = size.empty() ? data.height : size[1];
   desc.samples = o.samples > 0 ? o.samples : data.samples;
+  desc.filter = data.filter, desc.filter_width = data.filter_width;
   desc.passes = o.passes;
   if (o.groups) desc.flags |= LUMICUT_GROUPS;
   if (o.denoise) desc.flags |= LUMICUT_DENOISE;

@@ -135,6 +135,7 @@ class FlythroughCommand {
     frame_.width = data.width, frame_.height = data.height;
     if (!size.empty()) frame_.width = size[0], frame_.height = size[1];
     frame_.samples = o_.samples > 0 ? o_.samples : data.samples;
+    frame_.filter = data.filter, frame_.filter_width = data.filter_width;
     for (size_t i = 0; i < cameras.size(); ++i) try {
         render(cameras[i], i);
       } catch (const Interrupted&) {

@@ -178,6 +178,7 @@ class RenderCommand {
     desc_.width = size_.empty() ? data.width : size_[0];
     desc_.height = size_.empty() ? data.height : size_[1];
     desc_.samples = o_.samples > 0 ? o_.samples : data.samples;
+    desc_.filter = data.filter, desc_.filter_width = data.filter_width;
     for (size_t i = 0; i < crop_.size(); ++i) desc_.crop[i] = crop_[i];
     desc_.passes = o_.passes;
     desc_.max_seconds = static_cast<float>(o_.seconds);

@@ -101,7 +101,7 @@ void trace_points(const TraceScene& scene, const BundleOrigin& origin, const flo
                   const float* pz, size_t n, uint8_t* occluded) {
   const auto& [light, directional, mask] = origin;
   const bool valid = within(light, directional ? scene.limits.direction : scene.limits.origin);
-  if (scene.top->root == kEmptyChild || !valid || (directional && light == Vec3f{})) {
+  if (scene.top->root == kEmptyChild || mask == 0 || !valid || (directional && light == Vec3f{})) {
     std::fill_n(occluded, n, uint8_t{0});
     return;
   }

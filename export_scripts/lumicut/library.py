@@ -23,8 +23,11 @@ FLOAT, INT, BOOL, CHOICE = range(4)
 UINT8, FLOAT32 = 0, 1
 ROBUST, FAST = 1, 2  # of SceneDesc.robust
 SRGB, CLAMP, NEAREST, BY_VIEW = 1, 2, 4, 8
-EMIT_BOTH_SIDES, PHONG, GGX, NO_FRESNEL, BURLEY, SHADOWS_PASS, HOLDOUT = 1, 2, 4, 8, 16, 32, 64
+EMIT_BOTH_SIDES, PHONG, GGX, NO_FRESNEL, BURLEY, SHADOWS_PASS, HOLDOUT, BUMP_SHADOWS = 1, 2, 4, 8, 16, 32, 64, 128
 POINT, SPOT, RECTANGLE, DISK, SUN = range(5)
+FACING_DISK, NO_SHADOWS = 1, 2  # of Light.flags
+EQUIRECTANGULAR, FISHEYE_EQUIDISTANT, FISHEYE_EQUISOLID = 1, 2, 3  # of Camera.panorama
+BOX, GAUSSIAN, BLACKMAN_HARRIS = range(3)  # of RenderDesc.filter
 RADIOMETRIC, WATT = 0, 1
 HIDDEN = 1  # of Environment.flags
 CAMERA_RAYS, DIFFUSE_RAYS, GLOSSY_RAYS, TRANSMISSION_RAYS, SHADOW_RAYS = 1, 2, 4, 8, 16  # of Mesh.mask
@@ -178,7 +181,7 @@ class Light(Descriptor):
                 ("color", c_float * 3), ("value", c_float), ("position", c_float * 3), ("radius", c_float),
                 ("direction", c_float * 3), ("angle", c_float), ("u", c_float * 3), ("blend", c_float),
                 ("v", c_float * 3), ("spread", c_float), ("spot_cosine", c_uint32), ("profile", c_uint32),
-                ("tangent", c_float * 3)]
+                ("tangent", c_float * 3), ("flags", c_uint32)]
 
 
 class Profile(Descriptor):
@@ -195,7 +198,8 @@ class Camera(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("orthographic", c_uint32), ("to_world", c_float * 12),
                 ("fov_y", c_float), ("height", c_float), ("shift", c_float * 2), ("near_clip", c_float),
                 ("far_clip", c_float), ("pixel_aspect", c_float), ("lens_radius", c_float),
-                ("focus_distance", c_float)]
+                ("focus_distance", c_float), ("panorama", c_uint32), ("fisheye_fov", c_float), ("fisheye_lens", c_float),
+                ("sensor", c_float * 2), ("longitude", c_float * 2), ("latitude", c_float * 2)]
 
 
 class IntegratorInfo(Descriptor):
@@ -215,7 +219,7 @@ class RenderDesc(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("width", c_uint32), ("height", c_uint32), ("samples", c_uint32),
                 ("crop", c_uint32 * 4), ("tile_size", c_uint32), ("passes", c_uint32), ("max_seconds", c_float),
                 ("target_error", c_float), ("confidence", c_float), ("flags", c_uint32), ("checkpoint", c_void_p),
-                ("checkpoint_size", c_uint64)]
+                ("checkpoint_size", c_uint64), ("filter", c_uint32), ("filter_width", c_float)]
 
 
 class Tile(Descriptor):
@@ -244,13 +248,26 @@ class LightsExtension(Structure):
                 ("set", ctypes.CFUNCTYPE(c_int32, c_void_p, POINTER(VplSet)))]
 
 
+# ---- lumicut_hits.h
+
+
+class FirstHit(Structure):
+    _fields_ = [("mesh", c_uint32), ("instance", c_uint32), ("triangle", c_uint32), ("material", c_uint32), ("u", c_float),
+                ("v", c_float)]
+
+
+class HitsExtension(Structure):
+    _fields_ = [("struct_size", c_uint32), ("reserved", c_uint32),
+                ("trace", ctypes.CFUNCTYPE(c_int32, c_void_p, POINTER(RenderDesc), c_uint64, c_uint64, POINTER(Tile), c_void_p))]
+
+
 # The same records as NumPy has them.
-VPL, VPL_ORIGIN, POINT_TO_SHADE, RAY, RAYHIT = map(np.dtype, (Vpl, VplOrigin, Point, Ray, Rayhit))
+VPL, VPL_ORIGIN, POINT_TO_SHADE, RAY, RAYHIT, FIRST_HIT = map(np.dtype, (Vpl, VplOrigin, Point, Ray, Rayhit, FirstHit))
 
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
 SIZES = {Ray: 48, Hit: 32, Rayhit: 80, Vpl: 64, Point: 64, DeviceDesc: 32, Status: 64, AccelDesc: 80, AccelInfo: 80,
-         AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 40, Material: 164, Mesh: 104, Light: 116, Profile: 40,
-         Environment: 64, Camera: 92, IntegratorInfo: 88, ParamInfo: 72, RenderDesc: 72, Tile: 20, ChannelInfo: 24}
+         AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 40, Material: 164, Mesh: 104, Light: 120, Profile: 40,
+         Environment: 64, Camera: 128, IntegratorInfo: 88, ParamInfo: 72, RenderDesc: 80, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32
 HANDLE = c_void_p
@@ -505,6 +522,19 @@ class Scene(Handle):
     def set_lights(self, lights):
         self._call("scene_set_lights", *_array(Light, lights))
 
+    def first_hits(self, frame, seed, number, rect):
+        """(pixels of the rectangle, samples) of dtype FIRST_HIT: what the rays of pass `number` meet of a frame that a
+        RenderDesc describes."""
+        table = self.library.dll.lumicut_get_extension(b"lumicut.hits/1")
+        if not table:
+            raise Error(UNSUPPORTED, "the library lacks the extension lumicut.hits/1")
+        x0, y0, x1, y1 = rect
+        out = np.empty(((x1 - x0) * (y1 - y0), max(1, frame.samples)), FIRST_HIT)
+        tile = Tile(x0=x0, y0=y0, x1=x1, y1=y1)
+        trace = ctypes.cast(table, POINTER(HitsExtension))[0].trace
+        self.library.check(trace(self.pointer, ctypes.byref(frame), seed, number, ctypes.byref(tile), out.ctypes.data))
+        return out
+
     def set_profiles(self, profiles):
         """(vertical, horizontal, values) each, before the lights that name them: radians and W/sr, a row of `values` for
         each horizontal angle."""
@@ -675,14 +705,14 @@ def _fill(rays, origins, directions, near, far):
 class Render(Handle):
     """A frame that renders in the background. Tiles and crop count rows from the top.
 
-    `passes`, `max_seconds`, `target_error`, `confidence` and `flags` as in lumicut_render_desc."""
+    `passes`, `max_seconds`, `target_error`, `confidence`, `flags` and filter as in lumicut_render_desc."""
 
     def __init__(self, integrator, scene, width, height, samples=1, crop=None, tile_size=0, passes=1, max_seconds=0.0,
-                 target_error=0.0, confidence=0.0, flags=0):
+                 target_error=0.0, confidence=0.0, flags=0, pixel_filter=BOX, filter_width=0.0):
         super().__init__(integrator.library)
         self.crop = tuple(crop) if crop else (0, 0, width, height)
         desc = RenderDesc(width=width, height=height, samples=samples, tile_size=tile_size, passes=passes,
-                          max_seconds=max_seconds, target_error=target_error, confidence=confidence, flags=flags)
+                          max_seconds=max_seconds, target_error=target_error, confidence=confidence, flags=flags, filter=pixel_filter, filter_width=filter_width)
         desc.crop[:] = self.crop
         self.components = self.library.channels()
         self._create("render_start", integrator.pointer, scene.pointer, ctypes.byref(desc))

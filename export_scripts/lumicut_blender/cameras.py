@@ -63,6 +63,43 @@ def fit(render, camera_data):
     return horizontal, camera_data.sensor_height if mode == "VERTICAL" else camera_data.sensor_width, width, height
 
 
+def set_panorama(out, camera, aspect, report):
+    """Makes `out` the panorama of a camera; False where there is none of its kind. `aspect`: of the image."""
+    data = camera.data
+    own = data if hasattr(data, "panorama_type") else data.cycles  # Blender 4.5 and later: its own
+    kind = own.panorama_type
+    if kind == "EQUIRECTANGULAR":
+        out.panorama = library.EQUIRECTANGULAR
+        out.longitude[:] = [own.longitude_min, own.longitude_max]
+        out.latitude[:] = [own.latitude_min, own.latitude_max]
+    elif kind in {"FISHEYE_EQUIDISTANT", "FISHEYE_EQUISOLID"}:
+        out.panorama = getattr(library, kind)
+        out.fisheye_fov = min(own.fisheye_fov, 2 * math.pi)
+        out.fisheye_lens = own.fisheye_lens
+        # In millimetres; the side that the sensor fits has its size, the other follows from the image.
+        horizontal = data.sensor_fit == "HORIZONTAL" or (data.sensor_fit == "AUTO" and aspect >= 1)
+        if horizontal:
+            out.sensor[:] = [data.sensor_width, data.sensor_width / aspect]
+        else:
+            side = data.sensor_height if data.sensor_fit == "VERTICAL" else data.sensor_width
+            out.sensor[:] = [side * aspect, side]
+    else:
+        report.note(f"{camera.name} ({kind.replace('_', ' ').title()})", "Panoramas taken as perspective ones")
+        return False
+    if data.dof.use_dof:
+        report.note(camera.name, "Depth of field of panoramas left out")
+    if data.shift_x or data.shift_y:
+        report.note(camera.name, "Lens shift of panoramas left out")
+    return True
+
+
+def filter_of(scene):
+    """(kind, width) of the pixel filter: Cycles' own setting, and its default."""
+    own = getattr(scene, "cycles", None)
+    kind = getattr(library, getattr(own, "pixel_filter_type", "BLACKMAN_HARRIS"))
+    return kind, 0.0 if kind == library.BOX else max(0.01, getattr(own, "filter_width", 1.5))
+
+
 def convert_camera(camera, scene, report, matrix=None, shift_x=None):
     """A library.Camera of a camera object, as the scene's resolution and pixel aspect frame it.
 
@@ -78,12 +115,12 @@ def convert_camera(camera, scene, report, matrix=None, shift_x=None):
     out.pixel_aspect = scene.render.pixel_aspect_x / scene.render.pixel_aspect_y
     out.shift[:] = [shift_x * heights, data.shift_y * heights]
     out.near_clip, out.far_clip = data.clip_start, data.clip_end
+    if data.type == "PANO" and set_panorama(out, camera, width / height, report):
+        return out
     if data.type == "ORTHO":
         out.orthographic = 1
         out.height = data.ortho_scale / heights
     else:
-        if data.type == "PANO":
-            report.note(camera.name, "Panoramic cameras taken as perspective ones")
         out.fov_y = 2 * math.atan(sensor / (2 * data.lens) / heights)
     if data.dof.use_dof:
         distance = data.dof.focus_distance

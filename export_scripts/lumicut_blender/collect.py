@@ -7,12 +7,12 @@ each set of materials; its instances are transforms.
 import bpy
 import numpy as np
 
-from . import lights, mesh_attributes, soft_spots, strands, worlds
+from . import lights, mesh_attributes, strands, worlds
 from .lumicut import library
 from .cameras import rows
 from .materials import Materials
 from .report import Report
-from .scene_data import Mesh, SceneData, flattened, is_flat
+from .scene_data import Mesh, Owner, SceneData, flattened, is_flat
 
 AS_MESH = {"CURVE", "FONT", "META", "SURFACE"}  # a MESH item follows for each
 LEFT_OUT = {"VOLUME": "Volumes left out", "GPENCIL": "Grease pencil left out", "GREASEPENCIL": "Grease pencil left out"}
@@ -133,6 +133,11 @@ class MeshReader:
                     found.append((self.materials.attribute_number(name), *read))
         return found
 
+    def uv_map(self):
+        """(triangles, 3, 2) of the map that renders use."""
+        corners = fetch(self.mesh.loop_triangles, "loops", len(self.mesh.loop_triangles), 3, np.int32)
+        return self._layer("", len(self.mesh.loops))[corners]
+
     def _slots(self, triangles):
         """Slot of each triangle; None: all the first."""
         mesh, count = self.mesh, len(self.numbers)
@@ -201,14 +206,18 @@ class MeshCache:
 
 
 class Collector:
-    def __init__(self, depsgraph, report=None, check=lambda: None, cache=None, images=None, max_shininess=1000.0, bake=None):
+    def __init__(self, depsgraph, report=None, check=lambda: None, cache=None, images=None, max_shininess=1000.0, bake=None,
+                 hits=False, uv_maps=False, aov=None):
         """`check` is called between meshes and instances and raises to stop. `bake`: sky.bake or the like, for worlds
-        that cannot be read."""
+        that cannot be read. `hits`, `uv_maps`: whether passes ask whose a hit is, and where on the UV map it lies. `aov`: (name, type) of an
+        output whose values materials emit, in place of what they are."""
+        self.hits, self.uv_maps, self._owners = hits, uv_maps, {}
         self.depsgraph, self.check, self.cache, self.bake = depsgraph, check, cache, bake
         self.report = report if report is not None else Report()
         self.materials = Materials(self.report, max_shininess, images, check)
         render = depsgraph.scene_eval.render
         self.materials.aspect = (render.resolution_x * render.pixel_aspect_x) / max(1e-9, render.resolution_y * render.pixel_aspect_y)
+        self.materials.aov = aov
         self.materials.images.frame = depsgraph.scene_eval.frame_current
         self.scene = SceneData()
         self.profiles = lights.Profiles(self.report)
@@ -251,6 +260,7 @@ class Collector:
                         self.scene.added_lamps.add(ob.name)
                 if not all(getattr(ob, "visible_" + ray) for ray in ("diffuse", "glossy", "transmission")):
                     self.report.note(ob.name, "Lamps hidden from some rays, which light all here")
+                self._check_linking(ob)
                 if ob.visible_camera:
                     self.report.note(ob.name, "Lamps that the camera should see, which it does not")
             elif ob.type in LEFT_OUT:
@@ -266,7 +276,6 @@ class Collector:
             sun.group = self._group(world)
             self.scene.lights.append((name, sun))
         self.scene.lamps = len(self.scene.lights)
-        self.scene.lights = soft_spots.spread_out(self.scene.lights)
         if self.scene.environment is not None:
             self.scene.environment.group = self._group(world)
         self.scene.transparent = scene.render.film_transparent
@@ -288,6 +297,8 @@ class Collector:
             self.scene.held_out = {n: self.materials.held_out(n) for n in sorted(used)}
         # Materials at last: the world's image has been numbered by now.
         self.scene.materials = self.materials.items() or [("default", library.Material())]
+        if self.hits:
+            self.scene.material_names = [converted.source for converted in self.materials.converted]
         self.scene.images = self.materials.image_items()
         self.scene.profiles = self.profiles.items
         self.scene.groups = list(self.groups)
@@ -381,6 +392,7 @@ class Collector:
                                       in shape(bool(self.materials.converted[number].plain_pictures())) if len(indices)]
             for mesh in self._shapes[made]:
                 mesh.transforms.append(rows(instance.matrix_world))
+                self._own(mesh, ob)
                 self.instances += 1
 
     def _add_points(self, instance, ob, override):
@@ -400,6 +412,7 @@ class Collector:
                 self._shapes[made] = [Mesh("spheres of points", positions, indices, positions, None, None, number, [], group, mask,
                                            catcher=ob.is_shadow_catcher)]
             self._shapes[made][0].transforms += transforms
+            self._own(self._shapes[made][0], ob, len(transforms))
             self.instances += len(transforms)
 
     def _add_variant(self, instance, ob, mesh, slots, numbers, mask):
@@ -424,13 +437,28 @@ class Collector:
                 target = flattened(target, transform)
                 if target is not None:
                     target.of_instances = {number: [values] for number, values in own.items()}
+                    target.owners = []
+                    self._own(target, ob)
                     self._flat.append(target)
                     self.instances += 1
                 return
             for number, values in own.items():
                 target.of_instances.setdefault(number, []).append(values)
             target.transforms.append(transform)
+            self._own(target, ob)
             self.instances += 1
+
+    def _own(self, mesh, ob, count=1):
+        """Notes for passes whose the newest transforms of a mesh are."""
+        if not self.hits:
+            return
+        if ob.name not in self._owners:
+            top = ob
+            while top.parent is not None:
+                top = top.parent
+            self._owners[ob.name] = len(self.scene.objects)
+            self.scene.objects.append(Owner(ob.name, top.name, ob.pass_index))
+        mesh.owners += [self._owners[ob.name]] * count
 
     def _is_pane(self, mesh, matrix):
         """Whether a mesh is open (has edges of a single face), or flat: at most a tenth as thick as wide."""
@@ -450,7 +478,13 @@ class Collector:
             hidden.add("camera")
         return hidden
 
+    def _check_linking(self, ob):
+        linking = getattr(ob, "light_linking", None)  # 4.0 and later
+        if linking is not None and (linking.receiver_collection or linking.blocker_collection):
+            self.report.note(ob.name, "Light and shadow linking left out")
+
     def _check_flags(self, ob):
+        self._check_linking(ob)
         if ob.is_shadow_catcher and self.depsgraph.mode == "VIEWPORT":
             self.report.note(ob.name, "Shadow catchers taken as ordinary objects in the viewport")
         of_cycles = getattr(self.depsgraph.scene, "cycles", None)
@@ -480,7 +514,11 @@ class Collector:
         if edited:
             mesh = ob.to_mesh(preserve_all_data_layers=True, depsgraph=self.depsgraph)
         try:
-            return MeshReader(ob.name, mesh, numbers, self.materials, self.report, self.check).read()
+            reader = MeshReader(ob.name, mesh, numbers, self.materials, self.report, self.check)
+            found = reader.read()
+            if self.uv_maps and found is not None and mesh.uv_layers:
+                found.uv_map = reader.uv_map()
+            return found
         finally:
             if edited:
                 ob.to_mesh_clear()

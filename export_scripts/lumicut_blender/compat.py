@@ -11,6 +11,14 @@ except ImportError:  # private to Blender's own panels: may move
         if output is not None and input_name in output.inputs:
             layout.template_node_view(tree, output, output.inputs[input_name])
 
+# Blender 5.0 has these passes by longer names.
+LONG_PASS_NAMES = {"IndexOB": "Object Index", "IndexMA": "Material Index", "Emit": "Emission", "Env": "Environment"}
+
+
+def pass_name(short):
+    return LONG_PASS_NAMES[short] if bpy.app.version >= (5, 0, 0) else short
+
+
 FLAT_RECTS = bpy.app.version >= (4, 1, 0)  # pixels of passes are set as one row of numbers
 
 

@@ -107,8 +107,11 @@ class LumicutEngine(bpy.types.RenderEngine):
         started = time.perf_counter()
         self.say("collecting the scene")
         report = self._report_of(scene.frame_current)
+        layer = depsgraph.view_layer_eval
+        hits = not self.is_preview and passes.wants_hits(layer)
         data = collect.Collector(depsgraph, report, self._check, max_shininess=settings.max_shininess,
-                                 bake=None if self.is_preview else sky.bake).collect()
+                                 bake=None if self.is_preview else sky.bake, hits=hits,
+                                 uv_maps=hits and layer.use_pass_uv).collect()
         views = cameras.views_of(self, scene, report)
         data.camera = views[0][1]
         collected = time.perf_counter() - started
@@ -156,6 +159,13 @@ class LumicutEngine(bpy.types.RenderEngine):
                 for part, beside in catching.values():
                     part.upload(beside, self._check)
                 catching = {name: beside for name, (_, beside) in catching.items()}
+            of_hits = passes.hit_passes_of(data, layer) if hits else None
+            seen = {} if self.is_preview else passes.scenes_beside(data, layer, lambda aov: collect.Collector(
+                depsgraph, None, self._check, max_shininess=settings.max_shininess, aov=aov).collect())
+            frames = {name: (part, library.Scene(device, **tracing)) for name, part in seen.items()}
+            for part, beside in frames.values():
+                part.upload(beside, self._check)
+            frames, seen = {name: beside for name, (_, beside) in frames.items()}, None
             data = part = None  # the library has its own copy now
             for name, value in parameters.items():
                 integrator.set(name, value)
@@ -169,6 +179,19 @@ class LumicutEngine(bpy.types.RenderEngine):
                     self._caught = {name: self._frame_beside(watched, name, beside, integrator_name, parameters, samples,
                                                              finished.passes_done, width, height, crop)
                                     for name, beside in catching.items()}
+                    for name, beside in frames.items():
+                        frame = self._frame_beside(watched, name, beside, integrator_name, parameters, samples,
+                                                   finished.passes_done, width, height, crop)
+                        self._passes[name] = passes.of_frame(name, layer, frame, passes.exposure(scene))
+                    if of_hits is not None:
+                        self.say("passes of hits")
+                        frame = library.RenderDesc(width=width, height=height, samples=samples, passes=self._options["passes"],
+                                                   filter=self._options["pixel_filter"], filter_width=self._options["filter_width"])
+                        frame.crop[:] = crop
+                        seed = int(integrator.get("seed"))
+                        self._passes |= of_hits.trace(target, frame, seed, finished.passes_done, self._check)
+                        for field, text in of_hits.metadata(layer.name).items():
+                            self.get_result().stamp_data_add_field(field, text)
                     self._write(render, depsgraph, self._chosen, crop, crop, height)
                     self.update_progress(1.0)
                     stats = render.stats()
@@ -192,6 +215,7 @@ class LumicutEngine(bpy.types.RenderEngine):
             report.note(settings.integrator, "Light groups left out by integrators that cannot tell them apart")
             groups = []
         options = {name: getattr(settings, name) for name in properties.STOPS}
+        options["pixel_filter"], options["filter_width"] = cameras.filter_of(depsgraph.scene_eval)
         layer = depsgraph.view_layer_eval
         options["flags"] = (library.ILLUMINANCE if layer.lumicut.use_pass_illuminance else 0) | (library.GROUPS if groups else 0)
         self._denoised = settings.denoise and settings.passes != 1
@@ -234,14 +258,14 @@ class LumicutEngine(bpy.types.RenderEngine):
             for parameter, value in parameters.items():
                 integrator.set(parameter, value)
             with library.Render(integrator, scene, width, height, samples, crop, self._tile_size(crop), passes=max(1, passes_done),
-                                flags=flags) as render:
-                self._poll(render, f"shadow catchers, {name}", lambda: None)
+                                flags=flags, **{name: self._options[name] for name in ("pixel_filter", "filter_width")}) as render:
+                self._poll(render, f"beside: {name}", lambda: None)
                 return {channel: render.read(channel) for channel in ("radiance", "alpha", *(["denoised"] if self._denoised else []))}
 
     def _follow(self, render, depsgraph, crop, height, groups, show_tiles):
         """Polls until the frame is done; hands tiles over as they finish. The library's last status."""
         self._chosen = self._pass_list(depsgraph, groups, render.groups())
-        self._caught, self._tiles_shown = {}, 0.0
+        self._caught, self._passes, self._tiles_shown = {}, {}, 0.0
 
         def show():
             if show_tiles and not bpy.app.background and time.perf_counter() > self._tiles_shown + SHOW_SECONDS:
@@ -314,11 +338,13 @@ class LumicutEngine(bpy.types.RenderEngine):
         try:
             found = result.layers[0].passes
             filler = passes.Filler(render, depsgraph.scene_eval, camera, tile, *(self._backdrop or ()), denoised=self._denoised,
-                                   caught=self._caught, shadows_apart=passes.wants_shadows_apart(depsgraph.view_layer_eval))
+                                   caught=self._caught, shadows_apart=passes.wants_shadows_apart(depsgraph.view_layer_eval),
+                                   beside=self._passes)
             for name, source in [("Combined", "combined"), *chosen]:
                 target = found.get(name)
-                if target is not None and source is not None:
-                    passes.write_pass(target, filler.fill(source))
+                pixels = filler.fill(name, source) if target is not None and source is not None else None
+                if pixels is not None:
+                    passes.write_pass(target, pixels)
         finally:
             self.end_result(result)
 

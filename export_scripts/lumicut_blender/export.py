@@ -15,13 +15,18 @@ import zlib
 
 import numpy as np
 
-from . import properties
+from . import cameras, properties
 from .lumicut import library
 from .scene_data import Program
 
 
 class ExportError(RuntimeError):
     pass
+
+
+def pixel_filter(scene):
+    kind, width = cameras.filter_of(scene)
+    return {} if kind == library.BOX else {"filter": ("box", "gaussian", "blackman_harris")[kind], "filter_width": numbers([width])[0]}
 
 
 def png(pixels):
@@ -218,6 +223,8 @@ class Writer:
                     out[key] = self.texture(getattr(m, key), "vectors")
         else:
             out["shininess"] = numbers([m.shininess])[0]
+        if m.flags & library.BUMP_SHADOWS:
+            out["bump_shadows"] = True
         if m.flags & library.HOLDOUT:
             out["holdout"] = True
         if m.flags & library.PHONG:
@@ -270,10 +277,14 @@ class Writer:
         out = {"type": kind, "unit": "watt", "value": numbers([light.value])[0], "color": numbers(light.color)}
         if light.group:
             out["group"] = light.group
+        if light.flags & library.NO_SHADOWS:
+            out["shadows"] = False
         if kind != "sun":
             out["position"] = numbers(light.position)
         if kind in ("point", "spot"):
             out["radius"] = numbers([light.radius])[0]
+            if light.flags & library.FACING_DISK:
+                out["facing_disk"] = True
         if light.profile:
             out |= {"ies": self.profile(light.profile), "direction": numbers(light.direction), "rotation": rotation_of(light)}
         if kind in ("spot", "sun"):
@@ -287,7 +298,21 @@ class Writer:
         return out
 
     @staticmethod
+    def panorama(c):
+        kind = ("equirectangular", "fisheye_equidistant", "fisheye_equisolid")[c.panorama - 1]
+        out = {"type": kind, "matrix": numbers(c.to_world), "near": numbers([c.near_clip])[0], "far": numbers([c.far_clip])[0]}
+        if c.panorama == library.EQUIRECTANGULAR:
+            return out | {"longitude": [max(-180.0, min(180.0, degrees(a))) for a in c.longitude],
+                          "latitude": [max(-90.0, min(90.0, degrees(a))) for a in c.latitude]}
+        out["fov"] = min(360.0, degrees(c.fisheye_fov))
+        if c.panorama == library.FISHEYE_EQUISOLID:
+            out |= {"lens": numbers([c.fisheye_lens])[0], "sensor": numbers(c.sensor)}
+        return out
+
+    @staticmethod
     def camera(c):
+        if c.panorama:
+            return Writer.panorama(c)
         out = {"type": "orthographic" if c.orthographic else "perspective", "matrix": numbers(c.to_world),
                "shift": numbers(c.shift), "near": numbers([c.near_clip])[0], "far": numbers([c.far_clip])[0],
                "pixel_aspect": numbers([c.pixel_aspect])[0]}
@@ -313,7 +338,7 @@ class Writer:
         mtl = f"{self.stem}.mtl"
         self.write(f"meshes/{mtl}", "".join(f"newmtl {n}\n" for n in names))
         out = {"description": "Exported from Blender by the Lumicut add-on", "up": "z",
-               "image": {"size": [width, height], "samples": settings.samples},
+               "image": {"size": [width, height], "samples": settings.samples, **pixel_filter(settings.id_data)},
                "camera": self.camera(self.data.camera),
                "materials": [self.material(n, m) for n, (_, m) in zip(names, self.data.materials)],
                "lights": [self.light(light) for _, light in self.data.lights], "meshes": []}

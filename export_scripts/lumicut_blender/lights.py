@@ -22,6 +22,8 @@ AREA_TYPES = {"SQUARE": library.RECTANGLE, "RECTANGLE": library.RECTANGLE, "DISK
 AREA_IS_LAMBERTIAN = (4, 3, 0)
 # Measured against each version's Cycles: 3.x multiplies by the cosine to the axis, 4.x no longer does.
 SPOT_WITHOUT_COSINE = (4, 0, 0)
+# Read in the sources of both: before 4.0 lamps are disks that face each point, since then spheres. Measured against each.
+LAMPS_ARE_SPHERES = (4, 0, 0)
 # Measured: 3.4.1 interpolates IES files around the full circle, 4.3.2 takes 0 beyond 0 and 360 degrees, which makes them
 # up to 1/16 brighter in their first and last interval, and files that are the same all around 1/8.
 IES_WITHOUT_WRAP = (4, 3, 0)
@@ -137,7 +139,7 @@ class Profiles:
                 return False
         if out.radius > 0:
             self.report.note(name, "Lamps with IES files, taken as points without a radius")
-        out.radius, out.type = 0.0, library.POINT
+        out.radius, out.type, out.flags = 0.0, library.POINT, out.flags & ~library.FACING_DISK
         key += (mirrored,)
         if key not in self._numbers:
             if not mirrored and len(horizontal) > 1:
@@ -195,13 +197,13 @@ def convert_light(name, light, matrix, images, report, profiles):
         return None
     if getattr(getattr(light, "cycles", None), "max_bounces", MANY_BOUNCES) < MANY_BOUNCES:
         report.note(name, "Max Bounces of lamps left out")
-    if not getattr(light, "use_shadow", True):
-        report.note(name, "Lamps without shadows, which cast them here")
     m = np.array(matrix)[:3]
     # The lamp's own axes; scale is kept for areas alone.
     x, y, z = m[:, 0], m[:, 1], m[:, 2]
     out = library.Light(unit=library.WATT, value=value)
     out.color[:] = [float(c) for c in colour]
+    if not getattr(getattr(light, "cycles", None), "cast_shadow", light.use_shadow):
+        out.flags |= library.NO_SHADOWS
     out.position[:] = m[:, 3].tolist()
     forward = -z / (np.linalg.norm(z) or 1.0)
     out.direction[:] = forward.tolist()
@@ -232,6 +234,8 @@ def convert_light(name, light, matrix, images, report, profiles):
         out.radius = min(light.angle / 2, math.pi / 2)
         return out
     out.radius = light.shadow_soft_size
+    if out.radius > 0 and bpy.app.version < LAMPS_ARE_SPHERES:
+        out.flags |= library.FACING_DISK
     if light.type == "SPOT":
         out.angle = min(light.spot_size, math.pi)
         out.blend = light.spot_blend

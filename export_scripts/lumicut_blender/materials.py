@@ -473,6 +473,7 @@ class Converted:
     pictures: dict
     mapping: Mapping
     by_ray: bool = False  # other kinds of rays may see another
+    source: tuple = (None, 0)  # name and pass index in Blender
 
     def plain_pictures(self):
         return {slot: p for slot, p in self.pictures.items() if not isinstance(p, ProgramPicture)}
@@ -491,6 +492,8 @@ class Converted:
 
 
 COARSE = "Textures that repeat much against others of their material, at a lower resolution"
+# Read in the sources: Chiang, Li and Burley's term in 3.4.1, against which it is measured; another one later.
+BUMPS_BY_MICROFACETS = (4, 3, 0)
 SLOTS = ("diffuse", "specular", "translucency", "emission", "opacity")
 
 
@@ -501,7 +504,7 @@ class Materials:
         self.report, self.max_shininess = report, max_shininess
         self.images = images or Images(report, check)
         self.converted, self.pictures = [], []
-        self.aspect = 1.0
+        self.aspect, self.aov = 1.0, None
         self._attributes = {}
         self._numbers, self._picture_numbers = {}, {}
 
@@ -634,7 +637,10 @@ class Materials:
             if slot == "opacity" and not isinstance(picture, ProgramPicture):
                 picture = self._mask(picture)
             setattr(m, slot + "_texture", self.picture_number(picture))
-        return Converted(name, m, pictures, mapping, surface.by_ray)
+        if {"normal", "height"} & set(pictures) and bpy.app.version < BUMPS_BY_MICROFACETS:
+            m.flags |= library.BUMP_SHADOWS
+        source = (None, 0) if material is None else (material.name, material.pass_index)
+        return Converted(name, m, pictures, mapping, surface.by_ray, source)
 
     def _gloss(self, surface, name, m):
         """Values of the slots diffuse and specular, and of roughness and metallic where they are pictures; flags and
@@ -742,6 +748,25 @@ class Materials:
             reader.note("", "Displacement taken as a bump map")
 
     def _surface(self, material, name, ray):
+        if self.aov is None:
+            return self._shaded_surface(material, name, ray)
+        surface = self._shaded_surface(material, name, ray)[0]
+        value = self._aov_value(material, name)
+        # Without that output it stands before others, and counts as nothing.
+        return Surface(emission=value or ZERO, opacity=surface.opacity, clear=surface.clear, holdout=value is None), None, None
+
+    def _aov_value(self, material, name):
+        """What the material's tree gives to the output of that name; None: it has none."""
+        if material is None or not material.use_nodes or material.node_tree is None:
+            return None
+        reader = SurfaceReader(name, self.images, self.report)
+        reader.aspect, reader.material_index = self.aspect, material.pass_index
+        for node in material.node_tree.nodes:
+            if node.type == "OUTPUT_AOV" and self.aov[0] in {getattr(node, "aov_name", ""), node.name}:
+                return reader.value(node.inputs["Value" if self.aov[1] == "VALUE" else "Color"], ())
+        return None
+
+    def _shaded_surface(self, material, name, ray):
         if material is None:
             return Surface(diffuse=Value(0.8)), None, None
         if not compat.has_nodes(material):

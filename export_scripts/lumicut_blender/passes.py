@@ -1,24 +1,34 @@
 # SPDX-License-Identifier: Apache-2.0
 """Passes of a view layer: which it asks for, what the library's channels give of them, what is left out or refused."""
+import dataclasses
+
 import numpy as np
 
-from . import compat, properties, shadow_catcher
+from . import compat, hit_passes, properties, shadow_catcher
 from .lumicut import library
 
 NO_DEPTH = 1e10  # as Cycles has it where nothing is hit
 
 # Properties of view layers, and of what Cycles adds to them, for passes that are not there: shown by their names.
 LEFT_OUT = {
-    "use_pass_vector": "Vector", "use_pass_uv": "UV", "use_pass_object_index": "Object Index",
-    "use_pass_material_index": "Material Index", "use_pass_shadow": "Shadow", "use_pass_ambient_occlusion": "Ambient Occlusion",
-    "use_pass_emit": "Emission", "use_pass_environment": "Environment", "use_pass_diffuse_direct": "Diffuse Direct",
+    "use_pass_vector": "Vector", "use_pass_shadow": "Shadow", "use_pass_ambient_occlusion": "Ambient Occlusion",
+    "use_pass_diffuse_direct": "Diffuse Direct",
     "use_pass_diffuse_indirect": "Diffuse Indirect", "use_pass_diffuse_color": "Diffuse Color",
     "use_pass_glossy_direct": "Glossy Direct", "use_pass_glossy_indirect": "Glossy Indirect",
     "use_pass_glossy_color": "Glossy Color", "use_pass_transmission_direct": "Transmission Direct",
     "use_pass_transmission_indirect": "Transmission Indirect", "use_pass_transmission_color": "Transmission Color",
-    "use_pass_cryptomatte_object": "Cryptomatte Object", "use_pass_cryptomatte_material": "Cryptomatte Material",
-    "use_pass_cryptomatte_asset": "Cryptomatte Asset", "use_pass_volume_direct": "Volume Direct",
+    "use_pass_volume_direct": "Volume Direct",
     "use_pass_volume_indirect": "Volume Indirect",
+}
+
+
+# Passes that no channel of the frame has, by the property of a view layer: made of its hits, or of frames beside it.
+BESIDE = {
+    "use_pass_object_index": (compat.pass_name("IndexOB"), "X", "VALUE", "hits"),
+    "use_pass_material_index": (compat.pass_name("IndexMA"), "X", "VALUE", "hits"),
+    "use_pass_uv": ("UV", "UVA", "VECTOR", "hits"),
+    "use_pass_emit": (compat.pass_name("Emit"), "RGB", "COLOR", "frame"),
+    "use_pass_environment": (compat.pass_name("Env"), "RGB", "COLOR", "frame"),
 }
 
 
@@ -56,6 +66,12 @@ def wanted(layer):
         chosen.append(("Normal", "XYZ", "VECTOR", "normal"))
     if getattr(layer, "use_pass_position", False):
         chosen.append(("Position", "XYZ", "VECTOR", "position"))
+    for prop, row in BESIDE.items():
+        if getattr(layer, prop, False):
+            chosen.append(row)
+    chosen += [(f"{hit_passes.CRYPTOMATTES[kind]}{i:02d}", "rgba", "COLOR", "hits") for kind in cryptomattes(layer)
+               for i in range((layer.pass_cryptomatte_depth + 1) // 2)]
+    chosen += [(aov.name, "RGBA" if aov.type == "COLOR" else "X", aov.type, "frame") for aov in aovs(layer)]
     if wants_shadows_apart(layer):
         chosen.append((shadow_catcher.PASS, "RGB", "COLOR", "shadow_catcher"))
     for channel, (name, prop, _, _, letters, kind) in properties.PASSES.items():
@@ -67,9 +83,66 @@ def wanted(layer):
     return chosen
 
 
+def hit_passes_of(data, layer):
+    names = {row[0] for row in wanted(layer)}
+    rows = [BESIDE[f"use_pass_{what}_index"][0] for what in ("object", "material")]
+    return hit_passes.HitPasses(data, cryptomattes(layer), layer.pass_cryptomatte_depth,
+                                rows if names & set(rows) else None, layer.use_pass_uv)
+
+
+def scenes_beside(data, layer, collect_aov):
+    """{pass: scene} of frames whose radiance is that pass: all that shines and is seen, alone; the world behind all; what
+    `collect_aov` gives for an AOV, whose values materials emit."""
+    out = {aov.name: dataclasses.replace(collect_aov((aov.name, aov.type)), lights=[], environment=None,
+                                         camera=data.camera) for aov in aovs(layer)}
+    if layer.use_pass_emit:
+        out[BESIDE["use_pass_emit"][0]] = dataclasses.replace(data, lights=[], environment=None, materials=[
+            (name, _only_emission(values)) for name, values in data.materials])
+    if layer.use_pass_environment:
+        holes = [(name, _as_hole(values)) for name, values in data.materials]
+        out[BESIDE["use_pass_environment"][0]] = dataclasses.replace(data, lights=[], materials=holes)
+    return out
+
+
+def _only_emission(values):
+    out = library.Material.from_buffer_copy(values)
+    for slot in ("diffuse", "specular", "translucency"):
+        getattr(out, slot)[:] = [0.0] * 3
+    out.metallic = out.transmission = out.coat = 0.0
+    for slot in ("diffuse", "specular", "translucency", "metallic", "roughness", "normal", "height"):
+        setattr(out, slot + "_texture", 0)
+    return out
+
+
+def _as_hole(values):
+    out = library.Material.from_buffer_copy(values)
+    out.flags |= library.HOLDOUT
+    return out
+
+
+def of_frame(name, layer, frame, exposure):
+    """Pixels of that pass from its frame's channels."""
+    aov = next((aov for aov in aovs(layer) if aov.name == name), None)
+    if aov is None:
+        return frame["radiance"] * np.float32(exposure)
+    return frame["radiance"][..., :1] if aov.type == "VALUE" else np.concatenate([frame["radiance"], frame["alpha"]], -1)
+
+
+def cryptomattes(layer):
+    return [kind for kind in hit_passes.CRYPTOMATTES if getattr(layer, "use_pass_cryptomatte_" + kind, False)]
+
+
+def aovs(layer):
+    return [aov for aov in getattr(layer, "aovs", ()) if aov.is_valid]
+
+
+def wants_hits(layer):
+    return any(row[3] == "hits" for row in wanted(layer))
+
+
 def added(chosen):
     """Of wanted() those that Blender does not add by itself."""
-    return [row for row in chosen if row[0] not in {"Depth", "Mist", "Normal", "Position"}]
+    return [row for row in chosen if row[0] not in {"Depth", "Mist", "Normal", "Position", *(row[0] for row in BESIDE.values())}]
 
 
 def note_left_out(layer, report):
@@ -77,8 +150,6 @@ def note_left_out(layer, report):
     for prop, name in LEFT_OUT.items():
         if getattr(layer, prop, False) or getattr(own, prop, False):
             report.note(name, "Passes left out")
-    if len(getattr(layer, "aovs", ())) > 0:
-        report.note("AOV", "Passes left out")
 
 
 def of_compositor(scene, layer_name):
@@ -116,13 +187,15 @@ def check_compositor(scene, layer):
 class Filler:
     """Pixels of one rectangle of a render. `camera`: a library.Camera. `backdrop(camera, tile)`: what it alone sees of the
     world, which is in the light group of number `group`. `denoised`: Combined and Error are. `caught`: channels of the frames
-    that shadow catchers need, of this very rectangle; {}: there are none. `shadows_apart`: they have a pass of their own, as Cycles has it, not Combined."""
+    that shadow catchers need, of this very rectangle; {}: there are none. `shadows_apart`: they have a pass of their own, as Cycles has it, not Combined. `beside`:
+    passes of this very rectangle that are made of its hits, or of frames of their own."""
 
-    def __init__(self, render, scene, camera, tile, backdrop=None, group=0, denoised=False, caught=None, shadows_apart=False):
+    def __init__(self, render, scene, camera, tile, backdrop=None, group=0, denoised=False, caught=None, shadows_apart=False, beside=None):
         self.render, self.scene, self.camera, self.tile = render, scene, camera, tile
         self._read, self._exposure, self._backdrop = {}, exposure(scene), backdrop
         self._with_backdrop = {"radiance", "denoised", "denoising_color", f"radiance.{group}"} if backdrop is not None else set()
         self._denoised, self._caught, self._shadows_apart = denoised, caught, shadows_apart
+        self._beside = beside or {}
         self.hit = self.channel("alpha") > 0
 
     def channel(self, name):
@@ -130,7 +203,10 @@ class Filler:
             self._read[name] = self.render.read(name, self.tile)
         return self._read[name]
 
-    def fill(self, source):
+    def fill(self, name, source):
+        """Pixels of a pass; None: not yet there."""
+        if source in {"hits", "frame"}:
+            return self._beside.get(name)
         own = getattr(self, source, None)
         return own() if own is not None else self.lit(source) if source.startswith("radiance") \
             else self.channel(source)
@@ -185,7 +261,7 @@ class Filler:
 
     def distance(self):
         """From the camera's place; orthographic: from its plane. 0 where nothing is hit."""
-        if self.camera.orthographic:
+        if self.camera.orthographic or self.camera.panorama:  # of panoramas the depth is the distance
             return self.channel("depth")
         place = np.array(self.camera.to_world[3::4], np.float32)
         return np.where(self.hit, np.linalg.norm(self.channel("position") - place, axis=-1, keepdims=True), 0)

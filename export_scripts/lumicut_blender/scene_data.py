@@ -39,6 +39,8 @@ class Mesh:
     attributes: list = dataclasses.field(default_factory=list)   # (number, library.OF_VERTICES ..., (places, components))
     of_instances: dict = dataclasses.field(default_factory=dict)  # number: values of each transform, for OF_INSTANCES
     catcher: bool = False                # a shadow catcher [shadow_catcher.py]
+    owners: list = dataclasses.field(default_factory=list)  # of each transform, into SceneData.objects, where passes ask for it
+    uv_map: np.ndarray | None = None     # (t, 3, 2) as the mesh has it, where a pass asks for it
 
     def all_attributes(self):
         return [*self.attributes, *((number, library.OF_INSTANCES, np.array(values, np.float32).reshape(len(values), -1))
@@ -47,6 +49,14 @@ class Mesh:
     def numbers(self):
         """Of all materials in use."""
         return [self.material] if self.materials is None else np.unique(self.materials)
+
+
+@dataclasses.dataclass(frozen=True)
+class Owner:
+    """An object, as passes tell it apart."""
+    name: str
+    asset: str  # the topmost of its parents
+    index: int
 
 
 @dataclasses.dataclass
@@ -117,6 +127,8 @@ class SceneData:
     transparent: bool = False  # whether the film is
     camera: library.Camera | None = None
     groups: list = dataclasses.field(default_factory=list)     # names of light groups, from number 1; 0: in none
+    objects: list = dataclasses.field(default_factory=list)    # Owners, where passes ask for them
+    material_names: list = dataclasses.field(default_factory=list)  # (name or None, pass index) of each material
     added_lamps: set = dataclasses.field(default_factory=set)  # names of those that do not shine where shadow catchers are alone
     held_out: dict = dataclasses.field(default_factory=dict)   # where there are shadow catchers: the same material as a hole to the camera
 

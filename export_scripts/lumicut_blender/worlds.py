@@ -30,7 +30,9 @@ class Backdrop:
         sx = ((np.arange(x0, x1) + 0.5 - 0.5 * width) * camera.pixel_aspect / height + camera.shift[0])[None, :, None]
         sy = (0.5 - (np.arange(y0, y1) + 0.5) / height + camera.shift[1])[:, None, None]
         scale = 0 if camera.orthographic else 2 * np.tan(camera.fov_y / 2)
-        x, y, z = np.moveaxis(((axes[:, 0] * sx + axes[:, 1] * sy) * scale - axes[:, 2]) @ self.rotation.T, -1, 0)
+        directions = (axes[:, 0] * sx + axes[:, 1] * sy) * scale - axes[:, 2] if not camera.panorama else \
+            panoramic(camera, axes, (np.arange(x0, x1) + 0.5) / width, 1 - (np.arange(y0, y1) + 0.5) / height)
+        x, y, z = np.moveaxis(directions @ self.rotation.T, -1, 0)
         rows, columns = self.texels.shape[:2]
         u = (0.5 - np.arctan2(y, x) / (2 * np.pi)) * columns - 0.5
         v = (0.5 - np.arctan2(z, np.hypot(x, y)) / np.pi) * rows - 0.5
@@ -39,6 +41,24 @@ class Backdrop:
         a, b = (self.texels[np.clip(top + k, 0, rows - 1), left % columns] * (1 - fu) +
                 self.texels[np.clip(top + k, 0, rows - 1), (left + 1) % columns] * fu for k in (0, 1))
         return self.factor * (a * (1 - fv) + b * fv)
+
+
+def panoramic(camera, axes, u, v):
+    """(h, w, 3) directions of a panorama, as scene/camera.cpp has them; beyond a fisheye's edge those of the edge."""
+    u, v = u[None, :], v[:, None]
+    if camera.panorama == library.EQUIRECTANGULAR:
+        west, east = camera.longitude
+        low, high = camera.latitude
+        along, up = west + (east - west) * u, low + (high - low) * v
+        ahead, right, up = np.cos(along) * np.cos(up), np.sin(along) * np.cos(up), np.sin(up) + 0 * u
+    else:
+        equisolid = camera.panorama == library.FISHEYE_EQUISOLID
+        x, y = (u - 0.5) * (camera.sensor[0] if equisolid else 2), (v - 0.5) * (camera.sensor[1] if equisolid else 2)
+        r = np.maximum(np.hypot(x, y), 1e-12)
+        angle = 2 * np.arcsin(np.minimum(1, r / (2 * camera.fisheye_lens))) if equisolid else \
+            np.minimum(1, r) * camera.fisheye_fov / 2
+        ahead, right, up = np.cos(angle), x / r * np.sin(angle), y / r * np.sin(angle)
+    return ahead[..., None] * -axes[:, 2] + right[..., None] * axes[:, 0] + up[..., None] * axes[:, 1]
 
 
 def convert_world(world, materials, report, bake=None):

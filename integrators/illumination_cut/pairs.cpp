@@ -199,7 +199,7 @@ void IlluminationCut::ask(uint32_t i, Workspace& work) {
 }
 
 void IlluminationCut::answer(const Vpl& light, size_t base, Workspace& work) const {
-  scene_->accel().occluded_from_point(shadow_origin(light), work.x, work.y, work.z, work.asked_count, work.occluded);
+  trace_shadows(scene_->accel(), light, work.x, work.y, work.z, work.asked_count, work.occluded);
   for (size_t k = 0; k < work.asked_count; ++k) {
     const uint32_t i = work.asked[k];
     work.known[i] = 1;

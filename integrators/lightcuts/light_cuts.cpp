@@ -87,7 +87,7 @@ HWY_INLINE void TraceEstimates(const Accel& accel, const Vpl& light, const Rgb& 
     }
   }
   if (n == 0) return;
-  accel.occluded_from_point(shadow_origin(light), cuts.x, cuts.y, cuts.z, n, cuts.occluded);
+  trace_shadows(accel, light, cuts.x, cuts.y, cuts.z, n, cuts.occluded);
   const uint8_t* occluded = cuts.occluded;
   for (size_t g = 0; g < kCutGroups; ++g) {
     if (lit[g] == 0) continue;

@@ -291,7 +291,7 @@ class Wspd final : public Integrator {
     const std::span<const Vpl> lights = tree_.groups(n);
     Cluster c;
     c.node = node;
-    c.origin = shadow_origin(lights[0]);
+    c.origin = shadow_origin(lights[0], block.box.center());
     const Vec3f to_block = block.box.center() - n.center;
     if (!c.origin.directional && !n.leaf()) {
       if (cubemaps_) {  // V to the ball's boundary, R inside
@@ -299,7 +299,7 @@ class Wspd final : public Integrator {
         c.origin.light = distance > n.radius ? n.center + to_block * (n.radius / distance) : block.box.center();
         c.share = tree_.local_visibility(n, to_block);
       } else {
-        c.origin = shadow_origin(representative(n, block.box.center()));
+        c.origin = shadow_origin(representative(n, block.box.center()), block.box.center());
       }
     }
     light_block(lights, 1.0f, falloff_, blocks.samples, b * kSamples, kSamples, false, work.part);

@@ -12,14 +12,15 @@ float unlike2(const Vpl& a, const Vpl& b) {
   if (a.kind == VplKind::sphere && b.kind == VplKind::sphere && a.ray_mask == b.ray_mask)
     return length2(a.normal - b.normal);
   if (a.kind != b.kind || a.edge_or_radius != b.edge_or_radius || a.blend_cosine != b.blend_cosine ||
-      a.spot_cosine != b.spot_cosine || a.spread_tan != b.spread_tan || a.ray_mask != b.ray_mask)
+      a.spot_cosine != b.spot_cosine || a.spread_tan != b.spread_tan || a.ray_mask != b.ray_mask ||
+      a.facing != b.facing)
     return 9.0f;
   return length2(a.normal - b.normal);
 }
 
 // One light in place of several: mean position and normal, weighted by intensity, and their sum.
 Vpl mean_light(std::span<const Vpl> lights, const std::vector<uint8_t>& group_of, uint8_t group) {
-  double position[3] = {}, normal[3] = {}, intensity[3] = {}, radius = 0, total = 0;
+  double position[3] = {}, normal[3] = {}, intensity[3] = {}, from_centre[3] = {}, radius = 0, total = 0;
   const Vpl* strongest = nullptr;
   for (size_t i = 0; i < lights.size(); ++i) {
     if (group_of[i] != group) continue;
@@ -27,7 +28,7 @@ Vpl mean_light(std::span<const Vpl> lights, const std::vector<uint8_t>& group_of
     const double w = luminance(v.intensity);
     for (int k = 0; k < 3; ++k) {
       position[k] += w * v.position[k], normal[k] += w * v.normal[k],
-          intensity[k] += static_cast<double>(v.intensity[k]);
+          intensity[k] += static_cast<double>(v.intensity[k]), from_centre[k] += w * v.from_centre[k];
     }
     radius += w * v.radius();
     total += w;
@@ -38,6 +39,7 @@ Vpl mean_light(std::span<const Vpl> lights, const std::vector<uint8_t>& group_of
   const double length_of_normal = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
   for (int k = 0; k < 3; ++k) {
     out.position[k] = static_cast<float>(position[k] / total);
+    out.from_centre[k] = static_cast<float>(from_centre[k] / total);
     // Normals that cancel each other: the strongest light's own.
     if (length_of_normal > 1e-3 * total) out.normal[k] = static_cast<float>(normal[k] / length_of_normal);
     out.intensity[k] = static_cast<float>(intensity[k]);

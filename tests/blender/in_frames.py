@@ -168,7 +168,7 @@ class Passes(unittest.TestCase):
         cls._write = write
         try:
             with h.quiet():
-                h.set_lumicut("exhaustive", 16, vpls=5000, max_depth=0, direct_share=1.0)
+                h.set_lumicut("exhaustive", passes=16, vpls=5000, max_depth=0, direct_share=1.0)
                 ours = h.render()
         finally:
             cls._write = saved

@@ -70,17 +70,39 @@ class LightUnits(unittest.TestCase):
                     shadow_soft_size=0)
         self.agree()
 
-    def test_spots_of_a_radius_have_soft_edges_and_soft_shadows(self):
+    def test_lamps_of_a_radius_have_soft_edges_and_soft_shadows(self):
         h.add_mesh("Card", [(0, -1, 0.6), (0.6, -1, 0.6), (0.6, 1, 0.6), (0, 1, 0.6)], [(0, 1, 2, 3)], h.diffuse())
-        # Cycles turns its disk towards each point: that takes some per cent where the radius is a tenth of the distance.
-        for radius, mean, most in ((0.05, 0.01, 0.02), (0.25, 0.02, 0.03), (0.5, 0.06, 0.06)):
-            with self.subTest(radius=radius):
+        for kind, radius in (("SPOT", 0.05), ("SPOT", 0.5), ("SPOT", 2.0), ("POINT", 1.0)):
+            with self.subTest(kind=kind, radius=radius):
                 for ob in [ob for ob in bpy.data.objects if ob.type == "LIGHT"]:
                     bpy.data.objects.remove(ob)
-                h.add_light("SPOT", (0, 0, 2.5), 200, spot_size=math.radians(70), spot_blend=0.1, shadow_soft_size=radius)
-                a, b = (h.blocks(h.radiance(image)) for image in self._both(256, 100, 4))
-                np.testing.assert_allclose(a.mean((0, 1)) / b.mean((0, 1)), 1, atol=mean)
-                self.assertLess(np.abs(a - b).max() / b.max(), most)
+                lamp = h.add_light(kind, (0, 0, 2.5), 200, shadow_soft_size=radius)
+                if kind == "SPOT":
+                    lamp.data.spot_size, lamp.data.spot_blend = math.radians(70), 0.1
+                a, b = (h.blocks(h.radiance(image)) for image in self._both(256, 4000, 4))
+                np.testing.assert_allclose(a.mean((0, 1)) / b.mean((0, 1)), 1, atol=MEAN)
+                self.assertLess(np.abs(a - b).max() / b.max(), BLOCK)
+
+    def test_a_lamp_at_a_ceiling_lights_the_room_below(self):
+        ceiling = h.add_plane(6, 2.5, h.diffuse())
+        ceiling.visible_camera = False
+        h.add_light("SPOT", (0, 0, 2.4), 200, spot_size=2.0, spot_blend=0.2, shadow_soft_size=0.5)
+        with h.quiet():
+            h.set_cycles(512, 3)
+            theirs = h.radiance(h.render())
+            h.set_lumicut("exhaustive", 4, passes=8, vpls=2000, max_depth=3)
+            ours = h.radiance(h.render())
+        np.testing.assert_allclose(ours.mean((0, 1)) / theirs.mean((0, 1)), 1, atol=0.02)
+
+    def test_lamps_without_shadows(self):
+        h.add_mesh("Card", [(0, -1, 0.6), (0.6, -1, 0.6), (0.6, 1, 0.6), (0, 1, 0.6)], [(0, 1, 2, 3)], h.diffuse())
+        for kind, size in (("POINT", {"shadow_soft_size": 0.2}), ("SUN", {"angle": 0.1}), ("AREA", {"size": 0.5})):
+            with self.subTest(kind=kind):
+                lamp = h.add_light(kind, (0, 0, 2.5), 5 if kind == "SUN" else 200, **size)
+                owner = lamp.data.cycles if hasattr(lamp.data.cycles, "cast_shadow") else lamp.data
+                setattr(owner, "cast_shadow" if owner is not lamp.data else "use_shadow", False)
+                self.agree(128, 0.05, 4000)
+                bpy.data.objects.remove(lamp)
 
     def test_sun(self):
         for angle in (0.0, 10.0):

@@ -23,7 +23,6 @@ NOT_IN_CYCLES = {"EEVEE_SPECULAR": "EEVEE alone", "SHADERTORGB": "EEVEE alone", 
 KNOWN = {
     "Wavelength": "a published fit, a few percent apart",
     "Particle Info: Random": "of particles; elsewhere the object's",
-    "Film: pixel filter": "samples lie in a box of one pixel",
 }
 
 

@@ -27,7 +27,7 @@ PATIENCE = 900  # seconds until a hanging Blender is killed: not a measure of an
 
 BATCHES = {
     "units": ["in_light_units", "in_materials", "in_images", "in_programs"],
-    "scenes": ["in_addon", "in_cancel", "in_catchers", "in_collect", "in_export", "in_frames", "in_interface", "in_objects", "in_views"],
+    "scenes": ["in_addon", "in_cancel", "in_catchers", "in_collect", "in_export", "in_film", "in_frames", "in_interface", "in_objects", "in_passes", "in_views"],
     "status": ["in_status"],
 }
 

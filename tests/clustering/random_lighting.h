@@ -33,6 +33,7 @@ inline SurfacePoint random_surface(Rng& rng, float half, bool glossy) {
       p.retro = 2.0f * rng.next_float() * share, p.dim = 0.5f * share;
     }
     if (rng.next_below(4) == 0) p.diffuse = {};
+    if (rng.next_below(4) == 0) p.smooth = normalize(p.normal + random_direction(rng) * rng.next_float());
   }
   return p;
 }
@@ -76,6 +77,10 @@ inline Vpl random_light(Rng& rng, VplKind kind, float half) {
     v.spot_cosine = static_cast<float>(rng.next_below(2));
     v.spread_tan = rng.next_below(2) == 0 ? 0.0f : 4.0f * rng.next_float();
     if (v.spread_tan > 0) v.spot_cosine = 1.0f;
+    if (rng.next_below(4) == 0) {
+      v.facing = true, v.lamp_radius = half * rng.next_float();
+      v.from_centre = random_direction(rng) * v.lamp_radius;
+    }
     if (rng.next_below(3) == 0) {
       const LightProfile& profile = *random_tables()[rng.next_below(2)];
       v.profile = profile.id();

@@ -143,7 +143,8 @@ TEST(Bounds, DoNotDependOnTheScaleOfTheScene) {
       const float s = scaled ? 1024.0f : 1.0f;  // a power of two: no rounding of its own
       if (scaled) {
         for (Vpl& v : lights)
-          v.position = v.position * s, v.edge_or_radius *= kind == VplKind::sphere ? s : 1.0f,
+          v.position = v.position * s, v.from_centre = v.from_centre * s,
+          v.edge_or_radius *= kind == VplKind::sphere ? s : 1.0f,
           v.intensity = v.kind == VplKind::directional ? v.intensity : v.intensity * (s * s);
         for (auto& axis : points.position)
           for (float& x : axis) x *= s;

@@ -75,6 +75,42 @@ TEST(SceneJson, TheCameraStandsAsItsAxesSay) {
   EXPECT_EQ(scene.camera.shift[1], -1.0f);
 }
 
+TEST(SceneJson, PanoramasHaveTheirAngles) {
+  TemporaryFolder folder;
+  json scene = json::parse(kScene);
+  scene["camera"].erase("fov_y");
+  scene["camera"]["type"] = "equirectangular";
+  lumicut_camera c = read_scene(folder.write("scene.json", scene.dump())).camera;
+  EXPECT_EQ(c.panorama, uint32_t{LUMICUT_EQUIRECTANGULAR});
+  EXPECT_NEAR(c.longitude[0], -M_PI, 1e-6);
+  EXPECT_NEAR(c.latitude[1], M_PI / 2, 1e-6);
+  scene["camera"]["longitude"] = {-90, 45};
+  c = read_scene(folder.write("scene.json", scene.dump())).camera;
+  EXPECT_NEAR(c.longitude[1], M_PI / 4, 1e-6);
+  scene["camera"].erase("longitude");
+  scene["camera"]["type"] = "fisheye_equisolid";
+  expect_in(error_of([&] { read_scene(folder.write("scene.json", scene.dump())); }), {"camera", "fov"});
+  scene["camera"]["fov"] = 180, scene["camera"]["lens"] = 10.5, scene["camera"]["sensor"] = {36, 24};
+  c = read_scene(folder.write("scene.json", scene.dump())).camera;
+  EXPECT_EQ(c.panorama, uint32_t{LUMICUT_FISHEYE_EQUISOLID});
+  EXPECT_NEAR(c.fisheye_fov, M_PI, 1e-6);
+  EXPECT_EQ(c.fisheye_lens, 10.5f);
+  EXPECT_EQ(c.sensor[0], 36.0f);
+}
+
+TEST(SceneJson, LampsMayFaceWhatTheyLightAndCastNoShadows) {
+  TemporaryFolder folder;
+  json scene = json::parse(kScene);
+  scene["lights"] = {{{"type", "point"}, {"position", {0, 1, 0}}, {"value", 1}, {"radius", 0.5}, {"facing_disk", true}},
+                     {{"type", "sun"}, {"direction", {0, -1, 0}}, {"value", 1}, {"shadows", false}}};
+  scene["image"]["filter"] = "gaussian", scene["image"]["filter_width"] = 2;
+  const SceneData data = read_scene(folder.write("scene.json", scene.dump()));
+  EXPECT_EQ(data.lights[0].flags, uint32_t{LUMICUT_FACING_DISK});
+  EXPECT_EQ(data.lights[1].flags, uint32_t{LUMICUT_NO_SHADOWS});
+  EXPECT_EQ(data.filter, uint32_t{LUMICUT_GAUSSIAN});
+  EXPECT_EQ(data.filter_width, 2.0f);
+}
+
 TEST(SceneJson, MeshesAreHiddenFromKindsOfRays) {
   const auto mask = [](const json& kinds) {
     return changed([&](json& s) { s["meshes"][0]["hidden_from"] = kinds; }).meshes[0].mask;

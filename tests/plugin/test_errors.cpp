@@ -174,7 +174,7 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
        "lumicut_material[3].flags: holds LUMICUT_SHADOWS_PASS without LUMICUT_GGX"},
       {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_SHADOWS_PASS, m.transmission = 0; },
        "lumicut_material[3].transmission: must be above 0 with LUMICUT_SHADOWS_PASS"},
-      {[](M& m) { m.flags = 128; }, "lumicut_material[3].flags: 128", LUMICUT_UNSUPPORTED},
+      {[](M& m) { m.flags = 256; }, "lumicut_material[3].flags: 256", LUMICUT_UNSUPPORTED},
   };
   for (const auto& w : wrongs) {
     auto m = materials();
@@ -209,6 +209,8 @@ TEST(Errors, FieldsOfLightsAreCheckedByNameAndValue) {
       {[&](L& l) { spot(l), l.angle = 0; }, "lumicut_light[0].angle: 0"},
       {[&](L& l) { spot(l), l.blend = 1.5f; }, "lumicut_light[0].blend: 1.5"},
       {[&](L& l) { spot(l), l.spot_cosine = 2; }, "lumicut_light[0].spot_cosine: 2"},
+      {[](L& l) { l.flags = 4; }, "lumicut_light[0].flags: 4", LUMICUT_UNSUPPORTED},
+      {[](L& l) { l.flags = LUMICUT_FACING_DISK; }, "lumicut_light[0].flags: LUMICUT_FACING_DISK is not for a"},
   };
   for (const auto& w : wrongs) {
     auto l = lamp();
@@ -313,6 +315,19 @@ TEST(Errors, FieldsOfMeshesTexturesCamerasAndEnvironmentsAreCheckedByNameAndValu
   refused_camera([](auto& c) { c.near_clip = 2, c.far_clip = 1; },
                  "lumicut_camera.far_clip: 1 is not beyond near_clip 2");
   refused_camera([](auto& c) { c.lens_radius = 1; }, "lumicut_camera.focus_distance: 0");
+  refused_camera([](auto& c) { c.panorama = 4; }, "lumicut_camera.panorama: 4");
+  refused_camera([](auto& c) { c.panorama = LUMICUT_EQUIRECTANGULAR, c.orthographic = 1; }, "lumicut_camera.panorama");
+  refused_camera([](auto& c) { c.panorama = LUMICUT_EQUIRECTANGULAR, c.latitude[1] = 2; },
+                 "lumicut_camera.latitude[1]: 2");
+  refused_camera([](auto& c) { c.panorama = LUMICUT_EQUIRECTANGULAR, c.longitude[0] = -kInf; },
+                 "lumicut_camera.longitude[0]: -inf");
+  refused_camera([](auto& c) { c.panorama = LUMICUT_EQUIRECTANGULAR, c.lens_radius = 1, c.focus_distance = 1; },
+                 "lumicut_camera.lens_radius: 1");
+  refused_camera([](auto& c) { c.panorama = LUMICUT_FISHEYE_EQUIDISTANT; }, "lumicut_camera.fisheye_fov: 0");
+  refused_camera([](auto& c) { c.panorama = LUMICUT_FISHEYE_EQUISOLID, c.fisheye_fov = 3; },
+                 "lumicut_camera.fisheye_lens: 0");
+  refused_camera([](auto& c) { c.panorama = LUMICUT_FISHEYE_EQUISOLID, c.fisheye_fov = 3, c.fisheye_lens = 1; },
+                 "lumicut_camera.sensor[0]: 0");
   refused_camera([](auto& c) { c.pixel_aspect = -1; }, "lumicut_camera.pixel_aspect: -1");
   refused_camera([](auto& c) { c.shift[1] = kInf; }, "lumicut_camera.shift[1]: inf");
 

@@ -34,7 +34,7 @@ def first_example():
 
 
 class Header(unittest.TestCase):
-    HEADERS = ("lumicut.h", "lumicut_lights.h", "lumicut_programs.h", "lumicut_state.h")
+    HEADERS = ("lumicut.h", "lumicut_hits.h", "lumicut_lights.h", "lumicut_programs.h", "lumicut_state.h")
     WARNINGS = ["-Wall", "-Wextra", "-Wpadded", "-pedantic", "-pedantic-errors", "-Werror", "-fsyntax-only"]
 
     def compile(self, compiler, standard, language, header, warnings):

@@ -151,6 +151,8 @@ std::vector<Change> spot_changes() {
       {"light.blend", [](Host& h) { h.lights[1].blend = 0.5f; }},
       {"light.spot_cosine", [](Host& h) { h.lights[1].spot_cosine = 1; }},
       {"light.radius", [](Host& h) { h.lights[1].radius = 0.1f; }},
+      {"light.flags, disk", [](Host& h) { h.lights[1].flags = LUMICUT_FACING_DISK; }},
+      {"light.flags, shadows", [](Host& h) { h.lights[1].flags = LUMICUT_NO_SHADOWS; }},
   };
 }
 
@@ -169,6 +171,9 @@ std::vector<Change> camera_changes() {
       camera("camera.far_clip", [](C& c) { c.far_clip = 3; }),
       camera("camera.pixel_aspect", [](C& c) { c.pixel_aspect = 1.5f; }),
       camera("camera.lens_radius", [](C& c) { c.lens_radius = 0.1f, c.focus_distance = 1; }),
+      camera("camera.panorama", [](C& c) { c.panorama = LUMICUT_EQUIRECTANGULAR; }),
+      camera("camera.longitude", [](C& c) { c.panorama = LUMICUT_EQUIRECTANGULAR, c.longitude[1] = 1; }),
+      camera("camera.fisheye_fov", [](C& c) { c.panorama = LUMICUT_FISHEYE_EQUIDISTANT, c.fisheye_fov = 2; }),
   };
 }
 
@@ -186,6 +191,8 @@ std::vector<Change> render_changes() {
       {"render.tile_size", [](Host& h) { h.frame.tile_size = 8; }},
       {"render.confidence", [](Host& h) { h.frame.confidence = 0.9f; }},
       {"render.flags illuminance", [](Host& h) { h.frame.flags |= LUMICUT_ILLUMINANCE; }},
+      {"render.filter", [](Host& h) { h.frame.filter = LUMICUT_BLACKMAN_HARRIS; }},
+      {"render.filter_width", [](Host& h) { h.frame.filter = LUMICUT_GAUSSIAN, h.frame.filter_width = 2; }},
       {"render.flags denoise", [](Host& h) { h.frame.flags |= LUMICUT_DENOISE; }},
       {"render.flags groups", [](Host& h) { h.frame.flags |= LUMICUT_GROUPS; }},
   };

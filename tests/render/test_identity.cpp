@@ -79,16 +79,16 @@ size_t expect_every_field_counts(const T& value) {
   }
 }
 
-TEST(Identity, EveryFieldOfAMaterialCounts) { EXPECT_EQ(expect_every_field_counts(Material{}), 45u); }
-TEST(Identity, EveryFieldOfALightCounts) { EXPECT_EQ(expect_every_field_counts(Light{}), 26u); }
+TEST(Identity, EveryFieldOfAMaterialCounts) { EXPECT_EQ(expect_every_field_counts(Material{}), 46u); }
+TEST(Identity, EveryFieldOfALightCounts) { EXPECT_EQ(expect_every_field_counts(Light{}), 28u); }
 TEST(Identity, EveryFieldOfAnEnvironmentCounts) { EXPECT_EQ(expect_every_field_counts(Environment{}), 15u); }
-TEST(Identity, EveryFieldOfACameraCounts) { EXPECT_EQ(expect_every_field_counts(Camera{}), 22u); }
-TEST(Identity, EveryFieldOfAVirtualLightCounts) { EXPECT_EQ(expect_every_field_counts(Vpl{}), 20u); }
+TEST(Identity, EveryFieldOfACameraCounts) { EXPECT_EQ(expect_every_field_counts(Camera{}), 31u); }
+TEST(Identity, EveryFieldOfAVirtualLightCounts) { EXPECT_EQ(expect_every_field_counts(Vpl{}), 25u); }
 TEST(Identity, EveryFieldOfAFrameCounts) {
-  EXPECT_EQ(expect_every_field_counts(FrameOptions{}), 12u);
+  EXPECT_EQ(expect_every_field_counts(FrameOptions{}), 14u);
   FrameOptions frame;
   frame.camera_samples = {0, 0};
-  EXPECT_EQ(expect_every_field_counts(frame), 13u);
+  EXPECT_EQ(expect_every_field_counts(frame), 15u);
 }
 TEST(Identity, EveryFieldOfAMeshCounts) {
   EXPECT_EQ(expect_every_field_counts(Mesh{}), 10u);

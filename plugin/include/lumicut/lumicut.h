@@ -157,6 +157,8 @@ enum {
   LUMICUT_NO_FRESNEL = 8,
   LUMICUT_BURLEY = 16,
   LUMICUT_SHADOWS_PASS = 32,
+  LUMICUT_BUMP_SHADOWS = 128, /* bent normals, of normal and height textures: the diffuse part is dimmed where light comes flatter
+                                 than it seems, as Blender has it before 4.3 */
   LUMICUT_HOLDOUT = 64 /* camera rays that meet it show black, and count in no channel: alpha is 0 there. Other rays see it */
 };
 
@@ -199,7 +201,7 @@ typedef struct lumicut_light {
   float color[3];     /* multiplies value */
   float value;
   float position[3];  /* centre; not for suns */
-  float radius;       /* point, spot: 0, or the radius of a sphere that emits evenly; sun: angular radius */
+  float radius;       /* point, spot: 0, or the radius of a sphere that emits evenly (spot: within its cone); sun: angular radius */
   float direction[3]; /* spot: axis of the cone; sun: the way light travels; rectangle, disk: unused */
   float angle;        /* spot: full opening angle */
   float u[3];         /* rectangle: whole edges; disk (ellipse): whole axes. Emits towards u x v, not from behind */
@@ -210,7 +212,11 @@ typedef struct lumicut_light {
   uint32_t profile;   /* point: 1 + index into the profiles set before the lights, about `direction`; value (in watt: over
                          4 pi) multiplies its values, and radius is passed over. 0: none */
   float tangent[3];   /* profile: where its horizontal angle 0 lies, made orthogonal to direction; 0: anywhere */
+  uint32_t flags;     /* LUMICUT_FACING_DISK, LUMICUT_NO_SHADOWS */
 } lumicut_light;
+/* FACING_DISK: point, spot: a disk of that radius which faces each point that it lights, in place of the sphere (Blender
+   before 4.0). NO_SHADOWS: nothing stands before it. */
+enum { LUMICUT_FACING_DISK = 1, LUMICUT_NO_SHADOWS = 2 };
 enum { LUMICUT_POINT = 0, LUMICUT_SPOT = 1, LUMICUT_RECTANGLE = 2, LUMICUT_DISK = 3, LUMICUT_SUN = 4 };
 enum { LUMICUT_RADIOMETRIC = 0, LUMICUT_WATT = 1 };
 
@@ -225,7 +231,14 @@ typedef struct lumicut_camera {
   float pixel_aspect;   /* width/height of a pixel; 0: 1 */
   float lens_radius;    /* depth of field; 0: pinhole */
   float focus_distance; /* along the forward axis */
+  uint32_t panorama;    /* LUMICUT_EQUIRECTANGULAR ...: all around, in place of fov_y; 0: none. Without shift and lens_radius */
+  float fisheye_fov;    /* opening angle, up to 2 pi; beyond it nothing is seen, alpha is 0 */
+  float fisheye_lens;   /* equisolid: focal length, in units of sensor */
+  float sensor[2];      /* equisolid: width and height of the image on it */
+  float longitude[2], latitude[2]; /* equirectangular: from left to right within +-pi, from below to above within +-pi/2; all 0: whole */
 } lumicut_camera;
+/* Fisheyes are round in a square image, and an ellipse in others (equidistant), or cut by the sensor (equisolid). */
+enum { LUMICUT_EQUIRECTANGULAR = 1, LUMICUT_FISHEYE_EQUIDISTANT = 2, LUMICUT_FISHEYE_EQUISOLID = 3 };
 
 LUMICUT_API lumicut_result lumicut_scene_create(lumicut_device device, const lumicut_scene_desc* desc, lumicut_scene* scene); /* [any] desc NULL: defaults */
 /* All setters are [object], replace what was set, and take effect at the next commit. */
@@ -263,7 +276,11 @@ typedef struct lumicut_render_desc {
                              the stops must be the same, and so is the image, bit for bit. One that holds all that is asked
                              for, or more, gives the image that it holds. NULL: begin */
   uint64_t checkpoint_size;
+  uint32_t filter;     /* of pixels: LUMICUT_BOX ... */
+  float filter_width;  /* in pixels, 0.01..10; box: 1 alone; 0: 1 for the box, else 1.5. The Gaussian exp(-2 (2x/width)^2) ends at
+                          1.5 widths from the centre, Blackman-Harris' window at 1 */
 } lumicut_render_desc;
+enum { LUMICUT_BOX = 0, LUMICUT_GAUSSIAN = 1, LUMICUT_BLACKMAN_HARRIS = 2 };
 enum { LUMICUT_CHECKPOINTS = 1, LUMICUT_ILLUMINANCE = 2, LUMICUT_GROUPS = 4, LUMICUT_DENOISE = 8, LUMICUT_KEEP_FIREFLIES = 16 };
 
 typedef struct lumicut_status {
