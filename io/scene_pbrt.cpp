@@ -900,8 +900,11 @@ class Reader {
         tokens_.fail(fmt::format("{} has the index {} of {} vertices", name, i, vertices));
       all.push_back(static_cast<uint32_t>(i));
     }
-    if (corners == 3) g.indices = std::move(all);
-    for (size_t i = 0; corners == 4 && i < all.size(); i += 4)
+    if (corners == 3) {
+      g.indices = std::move(all);
+      all.clear();
+    }
+    for (size_t i = 0; i + 3 < all.size(); i += 4)
       g.indices.insert(g.indices.end(), {all[i], all[i + 1], all[i + 3], all[i], all[i + 3], all[i + 2]});
     for (size_t i = 0; i < g.normals.size(); i += 3)
       if (!(std::hypot(g.normals[i], g.normals[i + 1], g.normals[i + 2]) > 0)) {
