@@ -93,10 +93,12 @@ DiscreteDistribution mixed(const LightSampler& emitters, size_t first, const std
   return DiscreteDistribution(chances);
 }
 
-RayHit camera_ray(const Scene& scene, FrameSize frame, Vec2f at, Rng& rng) {
+// Empty where the camera shows nothing, beside the circle of a fisheye.
+std::optional<RayHit> camera_ray(const Scene& scene, FrameSize frame, Vec2f at, Rng& rng) {
   const float lens_u = rng.next_float(), lens_v = rng.next_float();
   const auto width = static_cast<float>(frame.width), height = static_cast<float>(frame.height);
   const Camera::Sample c = scene.camera().generate(at.x * width, at.y * height, width, height, lens_u, lens_v);
+  if (c.outside) return {};
   RayHit ray;
   ray.ray.org = c.origin, ray.ray.dir = c.direction, ray.ray.tnear = c.tnear, ray.ray.tfar = c.tfar;
   ray.ray.mask = kCameraRay;
@@ -166,7 +168,9 @@ std::vector<CameraImportance::CameraPoint> CameraImportance::trace_camera_paths(
     for (size_t i = begin; i < end; ++i) {
       Rng rng(seed, Stage::importance, i);
       float weight = 1.0f;
-      const auto seen = what_camera_sees(scene, camera_ray(scene, frame, r2(i), rng), rng, weight);
+      const auto ray = camera_ray(scene, frame, r2(i), rng);
+      if (!ray) continue;
+      const auto seen = what_camera_sees(scene, *ray, rng, weight);
       if (!seen || !(weight > 0.0f)) continue;
       for (const SurfacePoint& point : seen->bsdf.layers()) {
         const PointBsdf bsdf(point);
