@@ -24,22 +24,27 @@ void parallel_chunks(size_t n, size_t chunk, Fn&& fn) {
   tbb::parallel_for(size_t{0}, chunks, [&](size_t i) { fn(i * chunk, std::min(n, (i + 1) * chunk)); });
 }
 
+// threads - 1 workers, and the thread of each call beside them: a call never waits for another one's work to end, not even
+// on a device of one thread (a commit while a long render runs). Beyond kCalls at once they do.
 class Arena {
  public:
   // 0: all hardware threads.
-  explicit Arena(int threads) : arena_(threads > 0 ? threads : hardware_threads()) {
+  explicit Arena(int threads)
+      : threads_(threads > 0 ? threads : hardware_threads()), arena_(threads_ - 1 + kCalls, kCalls) {
     // oneTBB has no more workers than cores unless told so.
-    if (arena_.max_concurrency() > hardware_threads())
-      control_ =
-          std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, arena_.max_concurrency());
+    if (threads_ > hardware_threads())
+      control_ = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, threads_);
   }
-  int threads() const { return arena_.max_concurrency(); }
+  int threads() const { return threads_; }
   template <typename Fn>
   auto run(Fn&& fn) {
     return arena_.execute(std::forward<Fn>(fn));
   }
 
  private:
+  static constexpr int kCalls = 8;
+
+  int threads_;
   tbb::task_arena arena_;
   std::unique_ptr<tbb::global_control> control_;
 };

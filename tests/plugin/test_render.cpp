@@ -258,6 +258,18 @@ TEST(Render, ItsSceneAndIntegratorMayNotChangeMeanwhile) {
   s.commit();
 }
 
+// Another call's work is not waited for, whose end nobody knows.
+TEST(Render, OnOneThreadLeavesRoomForCallsThatPrepareOtherScenes) {
+  const api::Device device(1);
+  const api::Scene s = scene(device);
+  const api::Integrator i = integrator(device, 200000);
+  const api::Render r(i, s, frame(2048, 2048));
+  api::Scene other = scene(device);
+  EXPECT_EQ(render(integrator(device, 10), other).size(), render(integrator(device, 10), s).size());
+  EXPECT_EQ(r.wait(0).state, LUMICUT_RUNNING);
+  r.cancel();
+}
+
 TEST(Render, WhatIsDoneCanBeReadWhileTheRestRuns) {
   const api::Device device(2);
   const api::Scene s = scene(device);
