@@ -122,7 +122,7 @@ class Reader {
                    ? name.C_Str()
                    : fmt::format("material {}", index);
     lumicut_material& m = out.values = default_material();
-    const auto colour = [&](const char* key, unsigned type, unsigned number, aiColor3D missing) {
+    const auto colour = [&](const char* key, unsigned type, unsigned number, const aiColor3D& missing) {
       aiColor3D c = missing;
       aiColor4D four;
       if (from.Get(key, type, number, four) == aiReturn_SUCCESS) c = {four.r, four.g, four.b};
