@@ -80,7 +80,7 @@ TEST(LightMatrix, EntriesAreWhatTheLightGivesToTheRow) {
       if (free < 1e-4f) continue;
       uint8_t occluded = 0;
       const bool directional = s.lights[l].kind == VplKind::directional;
-      const Vec3f& at = s.lights[l].position;
+      const Vec3f at = s.lights[l].lamp_radius > 0.0f ? place_facing(s.lights[l], p.position) : s.lights[l].position;
       if (directional)
         s.scene->accel().occluded_from_point({-s.lights[l].normal, true}, &p.position.x, &p.position.y, &p.position.z,
                                              1, &occluded);
