@@ -265,7 +265,11 @@ HWY_INLINE LobeSums SphereLobes(D d, const Vpl& light, const Points& points, siz
   V3 mirror{zero, zero, zero};
   if constexpr (kLobes != Lobes::none) mirror = Load3(d, points.mirror, p);
   const LobeShape shape = LoadShape<kLobes>(d, points, p);
-  const V even = MeanOfCosines<kLobes == Lobes::all, kCosine>(d, cone, normal, facing, mirror, shape.diffuse);
+  V even = MeanOfCosines<kLobes == Lobes::all, kCosine>(d, cone, normal, facing, mirror, shape.diffuse);
+  // What a bent normal lets through is that of the sphere's centre.
+  if constexpr (kLobes == Lobes::all)
+    if (shape.diffuse.bent)
+      even = hn::Mul(even, BumpShadow(d, shape.diffuse.smooth, normal, hn::Max(na, hn::Set(d, 1e-6f)), axis));
   parts.diffuse = hn::IfThenElseZero(lit, hn::Mul(cone.geometry, even));
   if constexpr (kLobes != Lobes::none) {
     if (kLobes == Lobes::cosine && hn::AllFalse(d, hn::And(lit, RisesAbove(d, cone, Dot(mirror, axis))))) return parts;
