@@ -257,7 +257,10 @@ class OldFiles(unittest.TestCase):
             settings.samples, settings.passes, settings.integrator = 1, 16, "lightcuts"
             settings.common.vpls, settings.common.compensate, settings.lightcuts.error = 3000, True, 0.05
 
-        self.assertEqual(properties.active_preset(self.reopened(good_of_then)), "good")
+        # Good has importance since; a file of then renders as it did.
+        settings = self.reopened(good_of_then)
+        self.assertIsNone(properties.active_preset(settings))
+        self.assertEqual((settings.samples, settings.passes, settings.common.vpls, settings.common.importance), (1, 16, 3000, False))
 
         def draft_of_then(settings):
             settings.samples, settings.integrator = 1, "illumination_cut"
