@@ -80,8 +80,9 @@ TEST(PairBounds, AMillionRandomPairsNeverPassTheBoundOfTheirClusters) {
       }
     }
   }
-  // A bound of infinity would pass as well: it must also be near, and able to say "nothing arrives".
-  EXPECT_GT(tight, pairs / 50);
+  // A bound of infinity would pass as well: it must also be near, and able to say "nothing arrives". (Bent normals dim a
+  // quarter of the points, which bounds do not know.)
+  EXPECT_GT(tight, pairs / 60);
   EXPECT_GT(zero_bounds, pairs / 50);
 }
 
