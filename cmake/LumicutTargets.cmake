@@ -111,3 +111,22 @@ function(lumicut_test_instruction_sets name filter)
       ENVIRONMENT "${environment};LUMICUT_TEST_INSTRUCTION_SET=${set}")
   endforeach()
 endfunction()
+
+# Manual pages of the program `target` and its commands, and bash's completion, made of what `--help` says.
+function(lumicut_manual target component)
+  find_package(Python3 REQUIRED COMPONENTS Interpreter)
+  get_target_property(name ${target} OUTPUT_NAME)
+  if(NOT name)
+    set(name ${target})
+  endif()
+  set(manual ${PROJECT_BINARY_DIR}/manual/${name})
+  set(script ${PROJECT_SOURCE_DIR}/tools/manual.py)
+  add_custom_command(OUTPUT ${manual}/${name}.1
+    COMMAND ${Python3_EXECUTABLE} ${script} $<TARGET_FILE:${target}> ${PROJECT_VERSION} ${manual}
+    DEPENDS ${target} ${script} VERBATIM)
+  if(NOT LUMICUT_FUZZ)
+    add_custom_target(${name}_manual ALL DEPENDS ${manual}/${name}.1)
+  endif()
+  install(DIRECTORY ${manual}/man1 DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT ${component})
+  install(FILES ${manual}/completion/${name} DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT ${component})
+endfunction()

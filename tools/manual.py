@@ -1,6 +1,6 @@
-"""Manual pages and bash's completion from what a command says of itself.
+"""Manual pages and bash's completion from what a program says of itself.
 
-manual.py LUMICUT VERSION FOLDER writes FOLDER/man1/lumicut.1.gz, lumicut-COMMAND.1.gz, FOLDER/completion/lumicut, and the
+manual.py PROGRAM VERSION FOLDER writes FOLDER/man1/PROGRAM.1.gz, PROGRAM-COMMAND.1.gz, FOLDER/completion/PROGRAM, and the
 first page without compression, whose time is the build's."""
 import gzip
 import pathlib
@@ -69,8 +69,13 @@ def page(name, summary, usage, sections, below, version, body=(), see=()):
     return "\n".join(out) + "\n"
 
 
-COMPLETION = """# bash completion of lumicut(1), made of what the command says of itself.
-_lumicut() {{
+def summary_of(above):
+    """The first line of a description, as the line NAME has it."""
+    return above.splitlines()[0].removeprefix("Lumicut ").rstrip(".")
+
+
+COMPLETION = """# bash completion of {program}(1), made of what the program says of itself.
+{function}() {{
   local current=${{COMP_WORDS[COMP_CWORD]}} previous=${{COMP_WORDS[COMP_CWORD-1]}} command=${{COMP_WORDS[1]-}}
   COMPREPLY=()
   if [ "$COMP_CWORD" -eq 1 ]; then
@@ -87,23 +92,23 @@ _lumicut() {{
     compopt -o filenames 2>/dev/null
   fi
 }}
-complete -F _lumicut lumicut
+complete -F {function} {program}
 """
 
 
 def main():
     command, version, folder = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
+    program = pathlib.Path(command).name
     for name in ("man1", "completion"):
         (folder / name).mkdir(parents=True, exist_ok=True)
-    top = read_help(command)
-    commands = [entry[0] for entry in top[2]["Subcommands"]]
-    lines = top[0].splitlines()
-    pages = {"lumicut": page("lumicut", "global illumination from many virtual lights", top[1], top[2], top[3], version, lines,
-                             [f"lumicut-{c}" for c in commands])}
+    above, usage, sections, below = read_help(command)
+    commands = [entry[0] for entry in sections["Subcommands"]]
+    pages = {program: page(program, summary_of(above), usage, sections, below, version, above.splitlines(),
+                           [f"{program}-{c}" for c in commands])}
     options, choices = "", ""
     for name in commands:
         above, usage, sections, below = read_help(command, name)
-        pages[f"lumicut-{name}"] = page(f"lumicut-{name}", above.splitlines()[0], usage, sections, below, version, see=["lumicut"])
+        pages[f"{program}-{name}"] = page(f"{program}-{name}", summary_of(above), usage, sections, below, version, see=[program])
         words = [n for entry in sections["Options"] for n in names_of(entry)]
         options += f"      {name}) mapfile -t COMPREPLY < <(compgen -W '{' '.join(words)}' -- \"$current\") ;;\n"
         for entry in sections["Options"]:
@@ -114,8 +119,9 @@ def main():
     for name, text in pages.items():
         with open(folder / "man1" / f"{name}.1.gz", "wb") as raw, gzip.GzipFile("", "wb", 9, raw, mtime=0) as out:
             out.write(text.encode())
-    (folder / "completion/lumicut").write_text(COMPLETION.format(commands=" ".join(commands), options=options, choices=choices))
-    (folder / "lumicut.1").write_text(pages["lumicut"])
+    (folder / "completion" / program).write_text(COMPLETION.format(
+        program=program, function="_" + program.replace("-", "_"), commands=" ".join(commands), options=options, choices=choices))
+    (folder / f"{program}.1").write_text(pages[program])
 
 
 if __name__ == "__main__":

@@ -51,9 +51,8 @@ void check_finite(const char* option, double value) {
 namespace {
 
 int run(int argc, char** argv) {
-  CLI::App app{
-      "Geometry: ball trees, sliding hulls, hitting sets and epsilon-nets for disks, face clusters on deforming "
-      "meshes"};
+  CLI::App app{"Ball trees, sliding hulls, hitting sets and epsilon-nets for disks, face clusters on deforming meshes"};
+  app.name("lumicut-geometry");
   app.require_subcommand(1);
   std::vector<std::pair<CLI::App*, Command>> commands;
   for (const auto add : {add_balltree, add_hitting_set, add_hull, add_net, add_recluster}) {

@@ -29,6 +29,10 @@
           ".size " #name ",.-" #name "\n")
 /* clang-format on */
 
+OLD(exp, "GLIBC_2.2.5"); /* these five: 2.29 tells of errors another way */
+OLD(exp2, "GLIBC_2.2.5");
+OLD(log, "GLIBC_2.2.5");
+OLD(log2, "GLIBC_2.2.5");
 OLD(pow, "GLIBC_2.2.5");
 OLD(hypotf, "GLIBC_2.2.5");
 OLD(dlsym, "GLIBC_2.2.5");

@@ -74,6 +74,14 @@ class Header(unittest.TestCase):
         self.assertEqual(re.findall(r"#include\s+(\S+)", HEADER.read_text()), ["<stdint.h>"])
 
 
+class Portable(unittest.TestCase):
+    def test_what_is_newer_than_glibc_2_28_is_known_to_the_portable_build(self):
+        """plugin/portable/old_glibc.c must have each function that this library takes of a newer one."""
+        newer = {name for name, minor in re.findall(r" (\w+)@GLIBC_2\.(\d+)", run("nm", "-D", "--undefined-only", LIBRARY)) if int(minor) > 28}
+        source = (ROOT / "plugin/portable/old_glibc.c").read_text()
+        self.assertEqual({name for name in newer if not re.search(rf"^(OLD\({name},|.*\b{name}( =|\())", source, re.M)}, set())
+
+
 class Exports(unittest.TestCase):
     def test_the_library_exports_what_the_header_declares_and_nothing_else(self):
         exported = set()
