@@ -90,4 +90,36 @@ std::vector<double> read_table_csv(std::istream& in, const std::string& name, si
   return table;
 }
 
+std::vector<std::vector<uint32_t>> read_index_rows_csv(std::istream& in, const std::string& name, size_t below) {
+  std::vector<std::vector<uint32_t>> rows;
+  std::string line;
+  for (size_t number = 1; std::getline(in, line); ++number) {
+    if (number == 1 && line.starts_with("\xef\xbb\xbf")) line.erase(0, 3);
+    const char *at = line.data(), *const end = at + line.size();
+    const auto skip = [&] {
+      while (at < end && (*at == ' ' || *at == '\t' || *at == '\r')) ++at;
+    };
+    skip();
+    if (at == end || *at == '#') continue;
+    std::vector<uint32_t> row;
+    while (true) {
+      skip();
+      uint32_t index = 0;
+      const auto r = std::from_chars(at, end, index);
+      if (r.ec != std::errc() || index >= below)
+        fail_argument(name + ", line " + std::to_string(number) + ": field " + std::to_string(row.size() + 1) +
+                      " is no index below " + std::to_string(below));
+      row.push_back(index);
+      at = r.ptr;
+      skip();
+      if (at == end) break;
+      if (*at++ != ',')
+        fail_argument(name + ", line " + std::to_string(number) + ": a comma is wanted after field " +
+                      std::to_string(row.size()));
+    }
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
 }  // namespace lumicut

@@ -20,6 +20,18 @@ Lists transpose(const Lists& a, size_t columns) {
   return t;
 }
 
+// Lists with the caller's points become lists with local ones, ascending.
+void number_points(Instance& in, size_t points) {
+  constexpr uint32_t kUnused = 0xffffffffu;
+  std::vector<uint32_t> local(points, kUnused);
+  for (const uint32_t p : in.points_of.list) local[p] = 0;
+  for (uint32_t p = 0; p < local.size(); ++p)
+    if (local[p] != kUnused) local[p] = static_cast<uint32_t>(in.point_id.size()), in.point_id.push_back(p);
+  for (uint32_t& p : in.points_of.list) p = local[p];
+  in.disks_of = transpose(in.points_of, in.point_id.size());
+  in.points_of = transpose(in.disks_of, in.disk_id.size());  // sorts
+}
+
 bool contains(std::span<const uint32_t> sorted, uint32_t x) {
   return std::binary_search(sorted.begin(), sorted.end(), x);
 }
@@ -29,17 +41,26 @@ bool contains(std::span<const uint32_t> sorted, uint32_t x) {
 Instance make_instance(const PointTree& tree, std::span<const Disk> disks, std::span<const uint32_t> chosen) {
   Instance in;
   in.disk_id.assign(chosen.begin(), chosen.end());
-  constexpr uint32_t kUnused = 0xffffffffu;
-  std::vector<uint32_t> local(tree.size(), kUnused);
   for (const uint32_t d : chosen) {
-    tree.for_each_in(disks[d], [&](uint32_t p) { in.points_of.list.push_back(p), local[p] = 0; });
+    tree.for_each_in(disks[d], [&](uint32_t p) { in.points_of.list.push_back(p); });
     in.points_of.offset.push_back(in.points_of.list.size());
   }
-  for (uint32_t p = 0; p < local.size(); ++p)
-    if (local[p] != kUnused) local[p] = static_cast<uint32_t>(in.point_id.size()), in.point_id.push_back(p);
-  for (uint32_t& p : in.points_of.list) p = local[p];
-  in.disks_of = transpose(in.points_of, in.point_id.size());
-  in.points_of = transpose(in.disks_of, in.disk_id.size());  // sorts
+  number_points(in, tree.size());
+  return in;
+}
+
+Instance make_instance(size_t points, std::span<const size_t> offsets, std::span<const uint32_t> members) {
+  Instance in;
+  in.disk_id.resize(offsets.empty() ? 0 : offsets.size() - 1);
+  std::iota(in.disk_id.begin(), in.disk_id.end(), 0u);
+  std::vector<uint32_t> seen(points, 0);
+  for (size_t r = 0; r < in.disk_id.size(); ++r) {
+    for (size_t i = offsets[r]; i < offsets[r + 1]; ++i)  // a point that a list names twice is in it once
+      if (seen[members[i]] != r + 1)
+        seen[members[i]] = static_cast<uint32_t>(r + 1), in.points_of.list.push_back(members[i]);
+    in.points_of.offset.push_back(in.points_of.list.size());
+  }
+  number_points(in, points);
   return in;
 }
 

@@ -28,6 +28,9 @@ struct Instance {
 // All incidences of the chosen disks; points that hit none of them are left out.
 Instance make_instance(const PointTree& tree, std::span<const Disk> disks, std::span<const uint32_t> chosen);
 
+// The same of ranges of any kind: range i holds members[offsets[i] .. offsets[i + 1]), points below `points`.
+Instance make_instance(size_t points, std::span<const size_t> offsets, std::span<const uint32_t> members);
+
 struct Kernel {
   Instance instance;
   std::vector<uint32_t> stands_for;  // by local point of the unreduced instance: the kernel's point that hits as much
@@ -48,7 +51,7 @@ size_t count(const Solution& s);
 // that many points), and improves `best` by greedy rounds on the reduced costs.
 double lower_bound(const Instance& in, int iterations, Solution& best);
 
-// (2,1) moves, and with k = 3 (3,2) moves, until none is left.
+// (2,1) moves, from k = 3 on (3,2) moves, with k = 4 (4,3) moves, until none is left.
 void local_search(const Instance& in, int k, Solution& s);
 
 }  // namespace lumicut::hitting

@@ -1,11 +1,13 @@
 // (k, k-1) local search on a reduced instance. [thesis ch. 8]
 //
-// Departs: rather than the pseudo-disk structures of sec. 8.3, triples are enumerated along links: two points of the
-// set are linked when some point y shares a disk with each of them, where both disks are hit by at most three points of
-// the set. An improving (3,2) move that contains no improving (2,1) or (1,0) move is connected by links: its two new
-// points each share a disk to be taken over with some of the three, and if those groups were apart, one group alone
-// would be an improving move.
+// Departs: rather than the pseudo-disk structures of sec. 8.3, sets of up to k points are enumerated along links: two
+// points of the set are linked when some point y shares a disk with each of them, where both disks are hit by at most k
+// points of the set. An improving move that contains no smaller improving move is connected by links: its new points
+// each share a disk to be taken over with some of the old ones, and if those groups were apart, one group alone would
+// be an improving move. Nothing here knows of disks: any lists will do.
 #include <algorithm>
+#include <array>
+#include <unordered_map>
 
 #include "geometry/hitting_instance.h"
 
@@ -108,19 +110,28 @@ class Search {
   bool try_set(const uint32_t* x, int n) {
     personal(x, n, own_);
     if (own_.empty()) return apply(x, n, nullptr, 0);
-    uint32_t y[2];
+    uint32_t y[3];
     if (n == 1) return false;
     if (common_point(own_, y[0])) return apply(x, n, y, 1);
-    if (n < 3) return false;
-    for (const uint32_t p : in_.points_of[smallest(own_)]) {
-      rest_.clear();
-      for (const uint32_t d : own_)
-        if (!covers(p, d)) rest_.push_back(d);
-      if (rest_.empty() || !common_point(rest_, y[1])) continue;
+    const int room = n - 1;
+    const int used = room > 1 ? cover(own_, room, y) : 0;
+    return used > 0 && apply(x, n, y, used);
+  }
+
+  // Up to `room` points, at least two, that are in all of `disks` together: how many (0: there are none).
+  int cover(const std::vector<uint32_t>& disks, int room, uint32_t* y) {
+    std::vector<uint32_t>& rest = rest_[room];
+    for (const uint32_t p : in_.points_of[smallest(disks)]) {
+      rest.clear();
+      for (const uint32_t d : disks)
+        if (!covers(p, d)) rest.push_back(d);
       y[0] = p;
-      return apply(x, n, y, 2);
+      if (rest.empty()) return 1;
+      if (common_point(rest, y[1])) return 2;
+      if (room < 3) continue;
+      if (const int more = cover(rest, room - 1, y + 1); more > 0) return 1 + more;
     }
-    return false;
+    return 0;
   }
 
   bool apply(const uint32_t* x, int nx, const uint32_t* y, int ny) {
@@ -148,7 +159,7 @@ class Search {
   }
 
   bool improve_around(uint32_t x) {
-    uint32_t set[3] = {x, 0, 0};
+    uint32_t set[4] = {x, 0, 0, 0};
     if (try_set(set, 1)) return true;
     links(x, near_);
     const std::vector<uint32_t> near = near_;
@@ -165,6 +176,7 @@ class Search {
         if (try_set(set, 3)) return true;
       }
     }
+    std::vector<std::array<uint32_t, 2>> ends;
     for (const uint32_t a : near) {
       set[1] = a;
       links(a, near_);
@@ -172,7 +184,36 @@ class Search {
         if (b == x || std::binary_search(near.begin(), near.end(), b)) continue;
         set[2] = b;
         if (try_set(set, 3)) return true;
+        if (k_ > 3) ends.push_back({a, b});
       }
+    }
+    return k_ > 3 && improve_by_quadruples(x, near, ends);
+  }
+
+  // A connected quadruple is a connected triple, x in it, and what one of its points is linked with.
+  bool improve_by_quadruples(uint32_t x, const std::vector<uint32_t>& near,
+                             std::vector<std::array<uint32_t, 2>>& pairs) {
+    for (size_t i = 0; i < near.size(); ++i)
+      for (size_t j = i + 1; j < near.size(); ++j) pairs.push_back({near[i], near[j]});
+    std::unordered_map<uint32_t, std::vector<uint32_t>> linked;
+    const auto of = [&](uint32_t p) -> const std::vector<uint32_t>& {
+      const auto [at, fresh] = linked.try_emplace(p);
+      if (fresh) links(p, at->second);
+      return at->second;
+    };
+    std::vector<std::array<uint32_t, 3>> triples;
+    for (const auto& [a, b] : pairs)
+      for (const uint32_t from : {x, a, b})
+        for (const uint32_t c : of(from)) {
+          if (c == x || c == a || c == b) continue;
+          triples.push_back({a, b, c});
+          std::sort(triples.back().begin(), triples.back().end());
+        }
+    std::sort(triples.begin(), triples.end());
+    triples.erase(std::unique(triples.begin(), triples.end()), triples.end());
+    for (const auto& t : triples) {
+      const uint32_t set[4] = {x, t[0], t[1], t[2]};
+      if (try_set(set, 4)) return true;
     }
     return false;
   }
@@ -182,7 +223,8 @@ class Search {
   Solution& s_;
   std::vector<uint32_t> hits_, disk_stamp_, disk_seen_, point_stamp_;
   std::vector<uint8_t> queued_;
-  std::vector<uint32_t> queue_, own_, rest_, near_, touched_;
+  std::vector<uint32_t> queue_, own_, near_, touched_;
+  std::vector<uint32_t> rest_[4];  // by room
   uint32_t stamp_ = 0;
 };
 

@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "geometry/hitting_instance.h"
 #include "geometry/point_tree.h"
+#include "geometry/predicates.h"
 
 namespace lumicut {
 namespace {
@@ -80,6 +81,32 @@ HittingSet solve_thinned(std::span<const Point2> points, const PointTree& full, 
   return result;
 }
 
+// Local search on the dominance reduction. `start` hits every disk.
+std::vector<uint32_t> improve(const Instance& full, size_t points, std::span<const uint32_t> start, int k) {
+  if (k < 2 || k > 4) fail_argument("hitting set: local search with k = " + std::to_string(k) + "; 2 to 4 expected");
+  const Kernel kernel = reduce(full);
+  std::vector<uint8_t> chosen(points, 0);
+  for (const uint32_t p : start) chosen[p] = 1;
+  Solution s(kernel.instance.point_id.size(), 0);
+  for (size_t p = 0; p < full.point_id.size(); ++p)
+    if (chosen[full.point_id[p]] && kernel.stands_for[p] != 0xffffffffu) s[kernel.stands_for[p]] = 1;
+  local_search(kernel.instance, k, s);
+  std::vector<uint32_t> set;
+  for (size_t p = 0; p < s.size(); ++p)
+    if (s[p]) set.push_back(kernel.instance.point_id[p]);
+  return set;
+}
+
+void validate_ranges(size_t points, std::span<const size_t> offsets, std::span<const uint32_t> members) {
+  if (offsets.empty() || offsets[0] != 0 || offsets.back() != members.size() ||
+      !std::is_sorted(offsets.begin(), offsets.end()))
+    fail_argument("hitting set: offsets go from 0 up to the " + std::to_string(members.size()) + " members");
+  for (size_t i = 0; i < members.size(); ++i)
+    if (members[i] >= points)
+      fail_argument("hitting set: member " + std::to_string(i) + " is point " + std::to_string(members[i]) + " of " +
+                    std::to_string(points));
+}
+
 }  // namespace
 
 void validate_hitting_instance(std::span<const Point2> points, std::span<const Disk> disks) {
@@ -141,24 +168,84 @@ std::vector<uint32_t> greedy_hitting_set(std::span<const Point2> points, std::sp
 
 std::vector<uint32_t> improve_hitting_set(std::span<const Point2> points, std::span<const Disk> disks,
                                           std::span<const uint32_t> start, int k) {
-  if (k != 2 && k != 3) fail_argument("hitting set: local search with k = " + std::to_string(k) + "; 2 or 3 expected");
   const auto unhit = unhit_disks(points, disks, start);
   if (!unhit.empty())
     fail_argument("hitting set: the start of the local search does not hit disk " + std::to_string(unhit[0]));
   std::vector<uint32_t> all(disks.size());
   std::iota(all.begin(), all.end(), 0u);
-  const Instance full = make_instance(PointTree(points), disks, all);
-  const Kernel kernel = reduce(full);
-  std::vector<uint8_t> chosen(points.size(), 0);
-  for (const uint32_t p : start) chosen[p] = 1;
-  Solution s(kernel.instance.point_id.size(), 0);
-  for (size_t p = 0; p < full.point_id.size(); ++p)
-    if (chosen[full.point_id[p]] && kernel.stands_for[p] != 0xffffffffu) s[kernel.stands_for[p]] = 1;
-  local_search(kernel.instance, k, s);
-  std::vector<uint32_t> set;
-  for (size_t p = 0; p < s.size(); ++p)
-    if (s[p]) set.push_back(kernel.instance.point_id[p]);
-  return set;
+  return improve(make_instance(PointTree(points), disks, all), points.size(), start, k);
+}
+
+HittingSet solve_hitting_set(size_t points, std::span<const size_t> offsets, std::span<const uint32_t> members,
+                             const HittingSetOptions& options) {
+  validate_ranges(points, offsets, members);
+  std::vector<size_t> kept{0};
+  std::vector<uint32_t> list;
+  size_t empty = 0;
+  for (size_t r = 0; r + 1 < offsets.size(); ++r) {
+    if (offsets[r] == offsets[r + 1]) {
+      if (!options.drop_empty_disks)
+        fail_argument("hitting set: range " + std::to_string(r) + " holds no point, so nothing can hit it");
+      ++empty;
+      continue;
+    }
+    list.insert(list.end(), members.begin() + static_cast<ptrdiff_t>(offsets[r]),
+                members.begin() + static_cast<ptrdiff_t>(offsets[r + 1]));
+    kept.push_back(list.size());
+  }
+  HittingSet result = solve_lists(make_instance(points, kept, list), options);
+  result.candidates = points;
+  result.empty_disks = empty;
+  return result;
+}
+
+std::vector<uint32_t> improve_hitting_set(size_t points, std::span<const size_t> offsets,
+                                          std::span<const uint32_t> members, std::span<const uint32_t> start, int k) {
+  validate_ranges(points, offsets, members);
+  std::vector<uint8_t> chosen(points, 0);
+  for (const uint32_t p : start) {
+    if (p >= points) fail_argument("hitting set: point " + std::to_string(p) + " of " + std::to_string(points));
+    chosen[p] = 1;
+  }
+  for (size_t r = 0; r + 1 < offsets.size(); ++r)
+    if (std::none_of(members.begin() + static_cast<ptrdiff_t>(offsets[r]),
+                     members.begin() + static_cast<ptrdiff_t>(offsets[r + 1]),
+                     [&](uint32_t p) { return chosen[p] != 0; }))
+      fail_argument("hitting set: the start of the local search does not hit range " + std::to_string(r));
+  return improve(make_instance(points, offsets, members), points, start, k);
+}
+
+Ranges points_in_copies(std::span<const Point2> points, std::span<const Point2> shape, std::span<const Disk> copies) {
+  validate_hitting_instance(points, copies);
+  validate_hitting_instance(shape, {});
+  double reach2 = 0;  // of the disk around the shape
+  for (size_t i = 0; i < shape.size(); ++i) {
+    const Point2 &a = shape[i], &b = shape[(i + 1) % shape.size()], &c = shape[(i + 2) % shape.size()];
+    if (shape.size() < 3 || orientation(a, b, c) <= 0 || orientation(a, b, {0, 0}) < 0)
+      fail_argument("shape: corner " + std::to_string(i) +
+                    ": a strictly convex polygon, counter-clockwise around the origin, is expected");
+    reach2 = std::max(reach2, dist2(a, {0, 0}));
+  }
+  if (shape.empty()) fail_argument("shape: no corners");
+  // One turn: corners that go round twice are convex at each.
+  for (size_t i = 1; i + 1 < shape.size(); ++i)
+    if (orientation(shape[0], shape[i], shape[i + 1]) <= 0) fail_argument("shape: its border crosses itself");
+  const double reach = std::sqrt(reach2) * (1 + 1e-12);
+  const PointTree tree(points);
+  Ranges ranges;
+  for (const Disk& copy : copies) {
+    tree.for_each_in({copy.centre, reach * copy.radius}, [&](uint32_t p) {
+      const Point2 at{points[p].x - copy.centre.x, points[p].y - copy.centre.y};
+      for (size_t i = 0; i < shape.size(); ++i) {
+        const Point2 &a = shape[i], &b = shape[(i + 1) % shape.size()];
+        const double side = (b.x - a.x) * (at.y - copy.radius * a.y) - (b.y - a.y) * (at.x - copy.radius * a.x);
+        if (side < 0) return;
+      }
+      ranges.members.push_back(p);
+    });
+    ranges.offsets.push_back(ranges.members.size());
+  }
+  return ranges;
 }
 
 std::vector<uint32_t> unhit_disks(std::span<const Point2> points, std::span<const Disk> disks,

@@ -45,12 +45,28 @@ HittingSet solve_hitting_set(std::span<const Point2> points, std::span<const Dis
 // not needed. Lists of all incidences.
 std::vector<uint32_t> greedy_hitting_set(std::span<const Point2> points, std::span<const Disk> disks, bool pruned);
 
-// Ch. 8: replaces up to `k` points (2 or 3) of a hitting set by fewer, as long as it can. With k = 3 the result has at
-// most 8 times the optimum's points, and that is tight. [Theorem 8.1]
+// Ch. 8: replaces up to `k` points (2, 3 or 4) of a hitting set by fewer, as long as it can. With k = 3 the result has
+// at most 8 times the optimum's points, and that is tight [Theorem 8.1]; with k = 4 at most 5 times.
 // `start` must hit every disk. Found by neighbourhood enumeration on the reduced instance, not by the structures of
 // sec. 8.3 (docs/decisions/0010-geometry-local-search.md).
 std::vector<uint32_t> improve_hitting_set(std::span<const Point2> points, std::span<const Disk> disks,
                                           std::span<const uint32_t> start, int k);
+
+// The same two for ranges of any kind, given by their points: range i holds members[offsets[i] .. offsets[i + 1]), each
+// below `points`; offsets: one more than there are ranges. Theorem 8.1 holds where the ranges are pseudodisks (regions
+// whose borders cross at most twice).
+HittingSet solve_hitting_set(size_t points, std::span<const size_t> offsets, std::span<const uint32_t> members,
+                             const HittingSetOptions& options = {});
+std::vector<uint32_t> improve_hitting_set(size_t points, std::span<const size_t> offsets,
+                                          std::span<const uint32_t> members, std::span<const uint32_t> start, int k);
+
+// Points in copies of a convex shape, which are pseudodisks: copy i is the shape, its corners counter-clockwise around
+// the origin, times disks[i].radius, moved to disks[i].centre. Ranges as above.
+struct Ranges {
+  std::vector<size_t> offsets{0};
+  std::vector<uint32_t> members;
+};
+Ranges points_in_copies(std::span<const Point2> points, std::span<const Point2> shape, std::span<const Disk> copies);
 
 // Every disk that `set` does not hit, ascending.
 std::vector<uint32_t> unhit_disks(std::span<const Point2> points, std::span<const Disk> disks,

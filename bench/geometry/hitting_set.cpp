@@ -3,6 +3,7 @@
 //
 //   bench_hitting_set            the table
 //   bench_hitting_set scale      dnet to a million points, and the memory-bounded path
+//   bench_hitting_set local      local search alone by the size of exchanges, on the tight instance and on random ones
 //   bench_hitting_set <n>        the table with n seconds for each integer program (default 60)
 #include <sys/wait.h>
 #include <unistd.h>
@@ -18,6 +19,7 @@
 #include "bench_util.h"
 #include "geometry/hitting_instance.h"
 #include "geometry/hitting_set.h"
+#include "geometry/independent_set.h"
 #include "point_sets.h"
 #ifdef LUMICUT_HAS_CGAL
 #include "geometry/dnet.h"
@@ -36,19 +38,7 @@ struct Case {
 };
 
 std::vector<Disk> make_disks(const Case& c, const std::vector<Point2>& p) {
-  std::vector<Disk> disks;
-  if (!std::strcmp(c.kind, "FIX")) {
-    for (const Point2& q : p) disks.push_back({q, c.r});
-    return disks;
-  }
-  Rng rng(2, Stage::test, c.disks);
-  const PointTree tree(p);
-  for (size_t i = 0; i < c.disks; ++i) {
-    Disk d;
-    d.centre.x = uniform01(rng), d.centre.y = uniform01(rng), d.radius = c.r * uniform01(rng);
-    if (tree.count_in(d) > 0) disks.push_back(d);
-  }
-  return disks;
+  return std::strcmp(c.kind, "FIX") == 0 ? fixed_disks(p, c.r) : random_disks(p, c.disks, c.r, 2);
 }
 
 struct Proof {
@@ -204,11 +194,60 @@ int scale() {
   return 0;
 }
 
+int local() {
+  std::printf("%-34s %8s %8s %8s | %8s %7s | %8s %7s | %8s %7s\n", "instance", "number", "at most", "start", "(2,1)",
+              "s", "(3,2)", "s", "(4,3)", "s");
+  // `most`: exchanges of four around many points that share disks take hours.
+  const auto row = [](const std::string& name, size_t number, size_t best, size_t start, int most, auto&& improved) {
+    std::printf("%-34s %8zu %8zu %8zu", name.c_str(), number, best, start);
+    for (int k = 2; k <= most; ++k) {
+      size_t size = 0;
+      const double s = time_of([&] { size = improved(k); });
+      std::printf(" | %8zu %7.2f", size, s);
+    }
+    std::printf("\n");
+    std::fflush(stdout);
+  };
+  for (const int side : {10, 30, 100}) {
+    if (smoke() && side > 10) break;
+    const TightInstance t = tight_instance(side);
+    row("hit: tight, side " + std::to_string(side), t.disks.size(), t.small, t.start.size(), 4,
+        [&](int k) { return improve_hitting_set(t.points, t.disks, t.start, k).size(); });
+  }
+  for (const double r : {0.01, 0.02}) {
+    const auto p = uniform_points(sized<size_t>(20000, 200), 1);
+    const auto disks = fixed_disks(p, r * sized(1, 10));
+    const auto start = greedy_hitting_set(p, disks, true);
+    row("hit: uniform 20K, FIX " + std::to_string(r).substr(0, 4), disks.size(),
+        solve_hitting_set(p, disks).points.size(), start.size(), r < 0.015 ? 4 : 3,
+        [&](int k) { return improve_hitting_set(p, disks, start, k).size(); });
+  }
+  for (const double r : {0.1, 0.01}) {
+    const auto p = uniform_points(sized<size_t>(50000, 500), 1);
+    const auto disks = random_disks(p, sized<size_t>(50000, 500), r, 2);
+    // What small ones first gives.
+    std::vector<uint32_t> order(disks.size()), start;
+    std::iota(order.begin(), order.end(), 0u);
+    std::stable_sort(order.begin(), order.end(),
+                     [&](uint32_t a, uint32_t b) { return disks[a].radius < disks[b].radius; });
+    for (const uint32_t d : order)
+      if (std::none_of(start.begin(), start.end(), [&](uint32_t e) {
+            const double sum = disks[d].radius + disks[e].radius;
+            return dist2(disks[d].centre, disks[e].centre) <= sum * sum;
+          }))
+        start.push_back(d);
+    row("independent: RND " + std::to_string(r).substr(0, 4), disks.size(), 0, start.size(), 4,
+        [&](int k) { return independent_disks(disks, k).size(); });
+  }
+  return 0;
+}
+
 }  // namespace
 }  // namespace lumicut::bench
 
 int main(int argc, char** argv) {
   lumicut::bench::print_header("Hitting sets for disks", argc, argv, 1);
   if (argc > 1 && !std::strcmp(argv[1], "scale")) return lumicut::bench::scale();
+  if (argc > 1 && !std::strcmp(argv[1], "local")) return lumicut::bench::local();
   return lumicut::bench::table(argc > 1 ? std::max(1, std::atoi(argv[1])) : 60);
 }

@@ -56,6 +56,11 @@ FUNCTIONS = {
     "hitting_set": (c_int, [_DOUBLES, c_size_t, _DOUBLES, c_size_t, c_int, POINTER(c_void_p), POINTER(HittingSetInfo)]),
     "hitting_set_greedy": (c_int, [_DOUBLES, c_size_t, _DOUBLES, c_size_t, c_int, POINTER(c_void_p)]),
     "hitting_set_improve": (c_int, [_DOUBLES, c_size_t, _DOUBLES, c_size_t, _INDICES, c_size_t, c_int, POINTER(c_void_p)]),
+    "hitting_set_of_ranges": (c_int, [c_size_t, _SIZES, _INDICES, c_size_t, c_int, _INDICES, c_size_t, c_int, POINTER(c_void_p),
+                                      POINTER(HittingSetInfo)]),
+    "points_in_copies": (c_int, [_DOUBLES, c_size_t, _DOUBLES, c_size_t, _DOUBLES, c_size_t, _SIZES, POINTER(c_void_p)]),
+    "tight_instance": (c_int, [c_int, _DOUBLES, _DOUBLES]),
+    "independent_disks": (c_int, [_DOUBLES, c_size_t, c_int, _INDICES, c_size_t, POINTER(c_void_p)]),
     "face_clusters_create": (c_int, [_DOUBLES, c_size_t, _INDICES, c_size_t, POINTER(FaceClustersDesc), POINTER(c_void_p)]),
     "face_clusters_release": (None, [c_void_p]),
     "face_clusters_run": (c_int, [c_void_p, c_size_t, _SIZES]),
@@ -308,6 +313,48 @@ def hitting_set(points, disks, method="default", drop_empty=False, start=None, e
     else:
         _check(_geometry().lumicut_hitting_set_greedy(*instance, method == "pruned", byref(chosen)))
     return _taken(chosen), {}
+
+
+def hitting_set_of_ranges(point_count, ranges, method="default", drop_empty=False, start=None, exchange=3):
+    """The same for ranges of any kind, lists of indices of their points (points_in_copies makes some): methods default and local. What is
+    proven of local search holds for pseudodisks."""
+    _choice(method, ("default", "local"), "method")
+    offsets = np.concatenate([[0], np.cumsum([len(r) for r in ranges])]).astype(np.uintp)
+    members = _whole(np.concatenate([np.asarray(r) for r in ranges if len(r)]) if offsets[-1] else np.empty(0, np.uint32), "ranges")
+    lists, chosen, info = (point_count, offsets.ctypes.data_as(_SIZES), _pointer(members, c_uint32), len(ranges)), c_void_p(), HittingSetInfo()
+    if method == "default" or start is None:
+        _check(_geometry().lumicut_hitting_set_of_ranges(*lists, drop_empty, None, 0, 0, byref(chosen), byref(info)))
+        start, known = _taken(chosen), {"lower_bound": info.lower_bound, "empty_disks": info.empty_disks, "greedy": info.greedy}
+        if method == "default":
+            return start, known
+    begin = _whole(start, "start")
+    _check(_geometry().lumicut_hitting_set_of_ranges(*lists, drop_empty, _pointer(begin, c_uint32), len(begin), exchange, byref(chosen), None))
+    return _taken(chosen), {}
+
+
+def points_in_copies(points, shape, copies):
+    """A list of indices for each copy (x, y, size) of a convex polygon, its corners (n, 2) counter-clockwise around the origin."""
+    points, shape, copies = _rows(points, 2, "points"), _rows(shape, 2, "shape"), _rows(copies, 3, "copies")
+    offsets, members = np.empty(len(copies) + 1, np.uintp), c_void_p()
+    _check(_geometry().lumicut_points_in_copies(_pointer(points), len(points), _pointer(shape), len(shape), _pointer(copies), len(copies),
+                                                offsets.ctypes.data_as(_SIZES), byref(members)))
+    return np.split(_taken(members), offsets[1:-1].astype(np.intp)) if len(copies) else []
+
+
+def tight_instance(side):
+    """(points, disks, start): `start` hits all disks, local search with exchange=3 cannot improve it, and the points before it do too,
+    of which there are nearly eight times fewer where `side` is large (1 to 300)."""
+    small = (side + 1) * (side + 2) // 2
+    points, disks = np.empty((max(0, small + 4 * side * side), 2)), np.empty((9 * side * side, 3))
+    _check(_geometry().lumicut_tight_instance(side, _pointer(points), _pointer(disks)))
+    return points, disks, np.arange(small, len(points), dtype=np.uint32)
+
+
+def independent_disks(disks, exchange=3, start=None):
+    """Indices of many disks that do not touch each other, from small ones first or from `start`, by local search."""
+    disks, begin, chosen = _rows(disks, 3, "disks"), _whole([] if start is None else start, "start"), c_void_p()
+    _check(_geometry().lumicut_independent_disks(_pointer(disks), len(disks), exchange, _pointer(begin, c_uint32), len(begin), byref(chosen)))
+    return _taken(chosen)
 
 
 def epsilon_net(points, epsilon, weights=None, thesis=False, c0=0.0, seed=0):

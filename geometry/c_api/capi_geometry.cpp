@@ -10,6 +10,8 @@
 #include "geometry/face_cluster_tree.h"
 #include "geometry/face_kmeans.h"
 #include "geometry/hitting_set.h"
+#include "geometry/independent_set.h"
+#include "geometry/instances.h"
 
 using namespace lumicut;
 using namespace lumicut::c_api;
@@ -40,6 +42,10 @@ std::vector<Aabb> boxes_of(std::span<const float> items) {
       boxes[i].lo[axis] = lo, boxes[i].hi[axis] = hi;
     }
   return boxes;
+}
+
+void check_exchange(int exchange) {
+  if (exchange < 2 || exchange > 4) fail_argument("exchange " + std::to_string(exchange) + " is not in 2 to 4");
 }
 
 }  // namespace
@@ -262,12 +268,64 @@ int lumicut_hitting_set_greedy(const double* points, size_t point_count, const d
 int lumicut_hitting_set_improve(const double* points, size_t point_count, const double* disks, size_t disk_count,
                                 const uint32_t* start, size_t start_count, int exchange, lumicut_indices* chosen) {
   return guard([&] {
-    if (exchange != 2 && exchange != 3) fail_argument("exchange " + std::to_string(exchange) + " is neither 2 nor 3");
+    check_exchange(exchange);
     const auto from = array(start, start_count, 1, "start");
     for (const uint32_t i : from)
       if (i >= point_count)
         fail_argument("start: " + std::to_string(i) + " is of none of " + std::to_string(point_count) + " points");
     give(improve_hitting_set(points_of(points, point_count), disks_of(disks, disk_count), from, exchange), chosen,
+         "chosen");
+  });
+}
+
+int lumicut_hitting_set_of_ranges(size_t point_count, const size_t* offsets, const uint32_t* members,
+                                  size_t range_count, int drop_empty, const uint32_t* start, size_t start_count,
+                                  int exchange, lumicut_indices* chosen, lumicut_hitting_set_info* info) {
+  return guard([&] {
+    if (exchange != 0) check_exchange(exchange);
+    if (point_count >= LUMICUT_GEOMETRY_NONE)
+      fail_argument("point_count " + std::to_string(point_count) + " is too many");
+    required(offsets, "offsets");
+    const std::span<const size_t> ends = {offsets, array(offsets, range_count, 1, "offsets").size() + 1};
+    const auto list = array(members, ends.back(), 1, "members");
+    if (exchange != 0) {
+      give(improve_hitting_set(point_count, ends, list, array(start, start_count, 1, "start"), exchange), chosen,
+           "chosen");
+      return;
+    }
+    HittingSetOptions o;
+    o.drop_empty_disks = drop_empty != 0;
+    const HittingSet h = solve_hitting_set(point_count, ends, list, o);
+    give(h.points, chosen, "chosen");
+    if (info != nullptr) *info = {h.lower_bound, h.empty_disks, h.greedy};
+  });
+}
+
+int lumicut_points_in_copies(const double* points, size_t point_count, const double* shape, size_t corner_count,
+                             const double* copies, size_t copy_count, size_t* offsets, lumicut_indices* members) {
+  return guard([&] {
+    array(shape, corner_count, 2, "shape"), array(copies, copy_count, 3, "copies"), required(offsets, "offsets");
+    const Ranges ranges =
+        points_in_copies(points_of(points, point_count), points_of(shape, corner_count), disks_of(copies, copy_count));
+    give(ranges.members, members, "members");
+    std::copy(ranges.offsets.begin(), ranges.offsets.end(), offsets);
+  });
+}
+
+int lumicut_tight_instance(int side, double* points, double* disks) {
+  return guard([&] {
+    required(points, "points"), required(disks, "disks");
+    const TightInstance t = tight_instance(side);
+    for (const Point2& p : t.points) *points++ = p.x, *points++ = p.y;
+    for (const Disk& d : t.disks) *disks++ = d.centre.x, *disks++ = d.centre.y, *disks++ = d.radius;
+  });
+}
+
+int lumicut_independent_disks(const double* disks, size_t disk_count, int exchange, const uint32_t* start,
+                              size_t start_count, lumicut_indices* chosen) {
+  return guard([&] {
+    check_exchange(exchange);
+    give(independent_disks(disks_of(disks, disk_count), exchange, array(start, start_count, 1, "start")), chosen,
          "chosen");
   });
 }

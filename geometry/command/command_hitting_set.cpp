@@ -16,18 +16,37 @@ namespace lumicut {
 namespace {
 
 struct Arguments {
-  std::string points, disks, out = "-", picture, method = "default", start;
+  std::string points, disks, ranges, shape, out = "-", picture, method = "default", start;
   bool drop_empty = false;
   int size = 1000, k = 3;
 };
+
+void tell_bound(const HittingSet& h) {
+  std::fprintf(stderr, "%zu empty disks dropped; no set has fewer than %zu points, gap %.2f %%; greedy %zu\n",
+               h.empty_disks, h.lower_bound, 100 * h.gap(), h.greedy);
+}
+
+// Ranges that are no disks.
+std::vector<uint32_t> solve(const Arguments& a, size_t points, const Ranges& ranges) {
+  if (a.method != "default" && a.method != "local")
+    fail_argument("--method " + a.method + ": of disks alone; --ranges and --shape take default and local");
+  if (a.method == "default" || a.start.empty()) {
+    HittingSetOptions o;
+    o.drop_empty_disks = a.drop_empty, o.local_search = a.method == "default";
+    const HittingSet h = solve_hitting_set(points, ranges.offsets, ranges.members, o);
+    tell_bound(h);
+    if (a.method == "default") return h.points;
+    return improve_hitting_set(points, ranges.offsets, ranges.members, h.points, a.k);
+  }
+  return improve_hitting_set(points, ranges.offsets, ranges.members, read_indices(a.start, points, "points"), a.k);
+}
 
 std::vector<uint32_t> solve(const Arguments& a, const std::vector<Point2>& points, const std::vector<Disk>& disks) {
   if (a.method == "default") {
     HittingSetOptions o;
     o.drop_empty_disks = a.drop_empty;
     const HittingSet h = solve_hitting_set(points, disks, o);
-    std::fprintf(stderr, "%zu empty disks dropped; no set has fewer than %zu points, gap %.2f %%; greedy %zu\n",
-                 h.empty_disks, h.lower_bound, 100 * h.gap(), h.greedy);
+    tell_bound(h);
     return h.points;
   }
   if (a.method == "dnet") {
@@ -41,18 +60,8 @@ std::vector<uint32_t> solve(const Arguments& a, const std::vector<Point2>& point
   }
   if (a.drop_empty) fail_argument("--drop-empty: not with --method " + a.method);
   if (a.method != "local") return greedy_hitting_set(points, disks, a.method == "pruned");
-  std::vector<uint32_t> start;
-  if (a.start.empty()) {
-    start = greedy_hitting_set(points, disks, true);
-  } else {
-    auto file = open_text(a.start);
-    for (const double v : read_numbers_csv(file, a.start, "index")) {
-      if (!(v >= 0 && v < static_cast<double>(points.size())) || v != static_cast<double>(static_cast<uint32_t>(v)))
-        fail_argument(a.start + ": index " + std::to_string(v) + " is of none of " + std::to_string(points.size()) +
-                      " points");
-      start.push_back(static_cast<uint32_t>(v));
-    }
-  }
+  const std::vector<uint32_t> start =
+      a.start.empty() ? greedy_hitting_set(points, disks, true) : read_indices(a.start, points.size(), "points");
   std::fprintf(stderr, "starts from %zu points\n", start.size());
   return improve_hitting_set(points, disks, start, a.k);
 }
@@ -61,12 +70,35 @@ int run(const Arguments& a) {
   check_output(a.out);
   io::check_distinct({a.out == "-" ? "" : a.out, a.picture});
   check_output(a.picture);
-  auto points_file = open_text(a.points), disks_file = open_text(a.disks);
+  if (a.disks.empty() == a.ranges.empty()) fail_argument("either --disks or --ranges is wanted");
+  if (!a.shape.empty() && a.disks.empty()) fail_argument("--shape: not with --ranges");
+  auto points_file = open_text(a.points);
   const auto points = read_points_csv(points_file, a.points);
-  const auto disks = read_disks_csv(disks_file, a.disks);
+  Ranges ranges;
+  std::vector<Disk> disks;
+  if (a.ranges.empty()) {
+    auto file = open_text(a.disks);
+    disks = read_disks_csv(file, a.disks);
+  } else {
+    auto file = open_text(a.ranges);
+    for (const auto& row : read_index_rows_csv(file, a.ranges, points.size())) {
+      ranges.members.insert(ranges.members.end(), row.begin(), row.end());
+      ranges.offsets.push_back(ranges.members.size());
+    }
+  }
+  std::vector<Point2> shape;
+  if (!a.shape.empty()) {
+    auto file = open_text(a.shape);
+    shape = read_points_csv(file, a.shape);
+    ranges = points_in_copies(points, shape, disks);
+  }
+  const bool of_disks = a.ranges.empty() && a.shape.empty();
+  if (!of_disks && !a.picture.empty()) fail_argument("--picture: of disks alone");
   const auto start = std::chrono::steady_clock::now();
-  const std::vector<uint32_t> chosen = solve(a, points, disks);
-  std::fprintf(stderr, "%zu points hit %zu disks; %.2f s\n", chosen.size(), disks.size(), seconds_since(start));
+  const std::vector<uint32_t> chosen = of_disks ? solve(a, points, disks) : solve(a, points.size(), ranges);
+  std::fprintf(stderr, "%zu points hit %zu %s; %.2f s\n", chosen.size(),
+               of_disks ? disks.size() : ranges.offsets.size() - 1, of_disks ? "disks" : "ranges",
+               seconds_since(start));
   write_points(a.out, points, chosen);
   if (!a.picture.empty())
     write_text(a.picture, draw_hitting_set(a.picture.ends_with(".svg"), points, disks, chosen, a.size));
@@ -79,7 +111,13 @@ Command add_hitting_set(CLI::App& app) {
   auto a = std::make_shared<Arguments>();
   auto* command = app.add_subcommand("hitting-set", "Few points that hit every disk");
   command->add_option("--points", a->points, "CSV: x,y")->required();
-  command->add_option("--disks", a->disks, "CSV: x,y,radius")->required();
+  command->add_option("--disks", a->disks, "CSV: x,y,radius");
+  command->add_option("--ranges", a->ranges,
+                      "In place of disks, sets of any kind (pseudodisks, for what is proven to hold): CSV, a row of "
+                      "indices of points each");
+  command->add_option("--shape", a->shape,
+                      "CSV: the corners of a convex polygon around 0,0, counter-clockwise; --disks then holds the "
+                      "places of copies and how large they are");
   command->add_option("--out", a->out, "CSV of the chosen points: index,x,y (-: standard output)");
   command->add_option("--picture", a->picture, "Picture of the instance, .svg or .png");
   command->add_option("--size", a->size, "Its size in pixels")->check(CLI::Range(50, 10000));
@@ -92,7 +130,7 @@ Command add_hitting_set(CLI::App& app) {
   command->add_option("--start", a->start,
                       "Of --method local: CSV of indices that hit every disk (none: pruned greedy)");
   command->add_option("--exchange", a->k, "Of --method local: most points that one step gives up for fewer")
-      ->check(CLI::Range(2, 3));
+      ->check(CLI::Range(2, 4));
   command->add_flag("--drop-empty", a->drop_empty, "Leave out disks without points rather than refuse them");
   return [a] { return run(*a); };
 }

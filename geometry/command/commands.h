@@ -17,6 +17,8 @@ using Command = std::function<int()>;
 Command add_balltree(CLI::App& app);
 Command add_hitting_set(CLI::App& app);
 Command add_hull(CLI::App& app);
+Command add_independent_set(CLI::App& app);
+Command add_instance(CLI::App& app);
 Command add_net(CLI::App& app);
 Command add_recluster(CLI::App& app);
 
@@ -27,6 +29,9 @@ void check_output(const std::string& path);
 void write_text(const std::string& path, const std::string& text);
 // index,x,y
 void write_points(const std::string& path, const std::vector<Point2>& points, const std::vector<uint32_t>& chosen);
+
+// The first column of a CSV, as the other commands write it: indices below `count`; `of` names what they count.
+std::vector<uint32_t> read_indices(const std::string& path, size_t count, const char* of);
 
 double seconds_since(std::chrono::steady_clock::time_point start);
 // CLI::Range lets NaN pass.

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "geometry/command/commands.h"
+#include "geometry/csv.h"
 #include "io/atomic_file.h"
 #include "io/file_error.h"
 #include "io/standard_streams.h"
@@ -40,6 +41,20 @@ void write_points(const std::string& path, const std::vector<Point2>& points, co
   write_text(path, text);
 }
 
+std::vector<uint32_t> read_indices(const std::string& path, size_t count, const char* of) {
+  std::vector<uint32_t> indices;
+  auto file = open_text(path);
+  size_t columns = 0;
+  const std::vector<double> table = read_table_csv(file, path, columns);
+  for (size_t i = 0; i < table.size(); i += columns) {
+    const double v = table[i];
+    if (!(v >= 0 && v < static_cast<double>(count)) || v != static_cast<double>(static_cast<uint32_t>(v)))
+      fail_argument(path + ": index " + std::to_string(v) + " is of none of " + std::to_string(count) + " " + of);
+    indices.push_back(static_cast<uint32_t>(v));
+  }
+  return indices;
+}
+
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
@@ -55,7 +70,8 @@ int run(int argc, char** argv) {
   app.name("lumicut-geometry");
   app.require_subcommand(1);
   std::vector<std::pair<CLI::App*, Command>> commands;
-  for (const auto add : {add_balltree, add_hitting_set, add_hull, add_net, add_recluster}) {
+  for (const auto add :
+       {add_balltree, add_hitting_set, add_hull, add_independent_set, add_instance, add_net, add_recluster}) {
     Command command = add(app);
     commands.emplace_back(app.get_subcommands({}).back(), std::move(command));
   }

@@ -9,6 +9,8 @@
 
 #include "core/error.h"
 #include "core/rng.h"
+#include "geometry/independent_set.h"
+#include "geometry/instances.h"
 
 namespace lumicut {
 namespace {
@@ -77,7 +79,7 @@ TEST(HittingSet, StandsBetweenItsBoundAndGreedyAndHitsEverything) {
 
 // Exhaustive check that no three points can be replaced by two, no two by one, and none be dropped.
 TEST(LocalSearch, LeavesNoImprovingMoveOnSmallInstances) {
-  for (const int k : {2, 3})
+  for (const int k : {2, 3, 4})
     for (uint64_t seed = 0; seed < 150; ++seed) {
       const Instance in = random_instance(seed + 1000, 13, 10 + seed % 50, 5 + seed % 8, 3);
       std::vector<uint32_t> all(in.points.size());
@@ -95,10 +97,121 @@ TEST(LocalSearch, LeavesNoImprovingMoveOnSmallInstances) {
                 << "seed " << seed << " k " << k << ": " << nx << " by " << std::popcount(y);
           }
       }
-      if (k == 3) {
-        EXPECT_LE(set.size(), 8 * optimum(in));  // Theorem 8.1
+      if (k > 2) {
+        EXPECT_LE(set.size(), (k == 3 ? 8 : 5) * optimum(in));  // Theorem 8.1, and the remark at Theorem 8.2
       }
     }
+}
+
+// Theorem 8.5: a hitting set nearly eight times too large that no (3,2) move improves.
+TEST(TightInstance, StopsExchangesOfThreeAndNotOfFour) {
+  for (const int side : {1, 2, 3, 7, 24}) {
+    const TightInstance t = tight_instance(side);
+    const auto s = static_cast<size_t>(side);
+    ASSERT_EQ(t.small, (s + 1) * (s + 2) / 2);
+    ASSERT_EQ(t.start.size(), 4 * s * s);
+    ASSERT_EQ(t.disks.size(), 9 * s * s);
+    for (const Disk& d : t.disks) {  // one point of each set, and no other
+      size_t of_small = 0, of_start = 0;
+      for (size_t p = 0; p < t.points.size(); ++p) (p < t.small ? of_small : of_start) += hits(t.points[p], d);
+      ASSERT_EQ(of_small, 1u) << side;
+      ASSERT_EQ(of_start, 1u) << side;
+    }
+    EXPECT_EQ(improve_hitting_set(t.points, t.disks, t.start, 3), t.start);
+    if (side > 1) {
+      EXPECT_LT(improve_hitting_set(t.points, t.disks, t.start, 4).size(), 5 * t.small);
+    }
+  }
+  const TightInstance t = tight_instance(60);
+  EXPECT_GT(t.start.size(), 7.6 * static_cast<double>(t.small));
+  EXPECT_THROW(tight_instance(0), Error);
+}
+
+// Squares are pseudodisks; lists of any kind go the same way as disks.
+TEST(HittingSet, OfRangesIsThatOfTheDisksWithThesePoints) {
+  for (uint64_t seed = 0; seed < 60; ++seed) {
+    const Instance in = random_instance(seed + 300, 14, 5 + seed % 40, 4 + seed % 9, 2);
+    Ranges ranges;
+    for (const Disk& d : in.disks) {
+      for (uint32_t p = 0; p < in.points.size(); ++p)
+        if (hits(in.points[p], d)) ranges.members.push_back(p), ranges.members.push_back(p);  // named twice
+      ranges.offsets.push_back(ranges.members.size());
+    }
+    const HittingSet a = solve_hitting_set(in.points, in.disks);
+    const HittingSet b = solve_hitting_set(in.points.size(), ranges.offsets, ranges.members);
+    EXPECT_EQ(a.points, b.points);
+    EXPECT_EQ(a.lower_bound, b.lower_bound);
+    std::vector<uint32_t> all(in.points.size());
+    std::iota(all.begin(), all.end(), 0u);
+    for (const int k : {2, 3, 4})
+      EXPECT_EQ(improve_hitting_set(in.points, in.disks, all, k),
+                improve_hitting_set(in.points.size(), ranges.offsets, ranges.members, all, k));
+  }
+}
+
+TEST(HittingSet, PointsInCopiesOfAShapeAreThoseOfItsHalfPlanes) {
+  const std::vector<Point2> hexagon{{2, 0}, {1, 2}, {-1, 2}, {-2, 0}, {-1, -2}, {1, -2}};
+  const auto inside = [&](const Point2& p, const Disk& d) {  // all numbers are small multiples of a half: exact
+    for (size_t i = 0; i < hexagon.size(); ++i) {
+      const Point2 &a = hexagon[i], &b = hexagon[(i + 1) % hexagon.size()];
+      if ((b.x - a.x) * (p.y - d.centre.y - d.radius * a.y) - (b.y - a.y) * (p.x - d.centre.x - d.radius * a.x) < 0)
+        return false;
+    }
+    return true;
+  };
+  const Instance in = random_instance(5, 300, 200, 20, 6);
+  const Ranges ranges = points_in_copies(in.points, hexagon, in.disks);
+  for (size_t i = 0; i < in.disks.size(); ++i) {
+    std::vector<uint32_t> found(ranges.members.begin() + static_cast<ptrdiff_t>(ranges.offsets[i]),
+                                ranges.members.begin() + static_cast<ptrdiff_t>(ranges.offsets[i + 1])),
+        expected;
+    std::sort(found.begin(), found.end());
+    for (uint32_t p = 0; p < in.points.size(); ++p)
+      if (inside(in.points[p], in.disks[i])) expected.push_back(p);
+    EXPECT_EQ(found, expected);
+  }
+  for (const std::vector<Point2>& shape : {std::vector<Point2>{},
+                                           {{1, 0}, {0, 1}},
+                                           {{1, 0}, {-1, -1}, {0, 1}},
+                                           {{1, 0}, {2, 0}, {2, 1}},
+                                           {{1, 1}, {3, 1}, {2, 3}}})
+    EXPECT_THROW(points_in_copies(in.points, shape, in.disks), Error);
+}
+
+// Exhaustive check that no disks can be given up for more.
+TEST(IndependentDisks, LeaveNoImprovingMoveAndTouchNot) {
+  for (const int k : {2, 3, 4})
+    for (uint64_t seed = 0; seed < 150; ++seed) {
+      Rng rng(seed + 50, Stage::test);
+      std::vector<Disk> disks;
+      for (int i = 0; i < 14; ++i)
+        disks.push_back({{0.5 * rng.next_below(20), 0.5 * rng.next_below(20)}, 0.5 * rng.next_below(6)});
+      std::vector<uint32_t> touching(disks.size(), 0);
+      for (size_t i = 0; i < disks.size(); ++i)
+        for (size_t j = 0; j < disks.size(); ++j) {
+          const double sum = disks[i].radius + disks[j].radius;
+          if (i != j && dist2(disks[i].centre, disks[j].centre) <= sum * sum) touching[i] |= 1u << j;
+        }
+      const auto independent = [&](uint32_t set) {
+        for (size_t i = 0; i < disks.size(); ++i)
+          if ((set >> i & 1) != 0 && (touching[i] & set) != 0) return false;
+        return true;
+      };
+      std::vector<uint32_t> start{static_cast<uint32_t>(seed % 14)};
+      for (const auto& set : {independent_disks(disks, k), independent_disks(disks, k, start)}) {
+        const uint32_t s = as_bits(set);
+        ASSERT_TRUE(independent(s));
+        for (uint32_t other = 0; other < 1u << disks.size(); ++other) {
+          if (std::popcount(other) <= std::popcount(s) || std::popcount(s & ~other) >= k) continue;
+          ASSERT_FALSE(independent(other)) << "seed " << seed << " k " << k;
+        }
+      }
+    }
+  EXPECT_TRUE(independent_disks({}, 3).empty());
+  const std::vector<Disk> two{{{0, 0}, 1}, {{2, 0}, 1}};
+  EXPECT_EQ(independent_disks(two, 3).size(), 1u) << "closed disks";
+  EXPECT_THROW(independent_disks(two, 3, std::vector<uint32_t>{0, 1}), Error);
+  EXPECT_THROW(independent_disks(two, 5), Error);
 }
 
 TEST(HittingSet, MemoryBoundedPathHitsEverythingToo) {
@@ -159,7 +272,10 @@ TEST(HittingSet, RefusesBadInputByName) {
   EXPECT_EQ(h.empty_disks, 1u);
   EXPECT_EQ(h.points, std::vector<uint32_t>{0});
   EXPECT_THROW(improve_hitting_set(p, std::vector<Disk>{{{0, 0}, 1}}, std::vector<uint32_t>{1}, 3), Error);
-  EXPECT_THROW(improve_hitting_set(p, {}, {}, 4), Error);
+  EXPECT_THROW(improve_hitting_set(p, {}, {}, 5), Error);
+  EXPECT_THROW(solve_hitting_set(2, std::vector<size_t>{0, 1}, std::vector<uint32_t>{2}), Error);
+  EXPECT_THROW(solve_hitting_set(2, std::vector<size_t>{0, 2, 1}, std::vector<uint32_t>{0, 1}), Error);
+  EXPECT_THROW(solve_hitting_set(2, std::vector<size_t>{0, 0}, {}), Error);
 }
 
 }  // namespace

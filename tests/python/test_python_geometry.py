@@ -155,6 +155,42 @@ class HittingSets(unittest.TestCase):
                 g.hitting_set(self.points, self.disks, "local", start=start)
 
 
+    def test_of_ranges_is_that_of_the_disks_that_hold_them(self):
+        ranges = [np.flatnonzero(row) for row in self.hit]
+        chosen, known = g.hitting_set_of_ranges(14, ranges)
+        expected, of_disks = g.hitting_set(self.points, self.disks)
+        self.assertEqual((list(chosen), known["lower_bound"]), (list(expected), of_disks["lower_bound"]))
+        for exchange in (2, 3, 4):
+            local, _ = g.hitting_set_of_ranges(14, ranges, "local", start=np.arange(14), exchange=exchange)
+            self.assertTrue(self.hit[:, local].any(1).all())
+        self.assertEqual(len(g.hitting_set_of_ranges(14, [*ranges, []], drop_empty=True)[0]), len(chosen))
+        for lists, says in (([[14]], "point 14"), ([[]], "range 0"), ([[-1]], "ranges")):
+            with self.assertRaisesRegex(g.Error, says):
+                g.hitting_set_of_ranges(14, lists)
+
+    def test_points_in_squares_are_those_within_their_sides(self):
+        found = g.points_in_copies(self.points, [[1, 1], [-1, 1], [-1, -1], [1, -1]], self.disks)
+        within = np.abs(self.disks[:, None, :2] - self.points).max(2) <= self.disks[:, 2:]
+        self.assertEqual([sorted(f) for f in found], [list(np.flatnonzero(row)) for row in within])
+
+    def test_the_tight_instance_stops_exchanges_of_three(self):
+        points, disks, start = g.tight_instance(6)
+        held = np.linalg.norm(disks[:, None, :2] - points, axis=2) <= disks[:, 2:]
+        np.testing.assert_array_equal(held.sum(1), 2)
+        np.testing.assert_array_equal(held[:, start].sum(1), 1)
+        self.assertEqual(list(g.hitting_set(points, disks, "local", start=start)[0]), list(start))
+        with self.assertRaisesRegex(g.Error, "side 0"):
+            g.tight_instance(0)
+
+    def test_independent_disks_do_not_touch(self):
+        chosen = g.independent_disks(self.disks)
+        apart = np.linalg.norm(self.disks[chosen][:, None, :2] - self.disks[chosen][:, :2], axis=2)
+        touch = apart <= self.disks[chosen][:, 2] + self.disks[chosen][:, 2:]
+        np.testing.assert_array_equal(touch, np.eye(len(chosen), dtype=bool))
+        with self.assertRaisesRegex(g.Error, "exchange 7"):
+            g.independent_disks(self.disks, 7)
+
+
 @unittest.skipUnless(HAS_CGAL, "built without CGAL")
 class EpsilonNets(unittest.TestCase):
     def test_no_heavy_disk_is_without_a_point(self):

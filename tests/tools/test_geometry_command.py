@@ -164,6 +164,50 @@ class GeometryCommand(unittest.TestCase):
         self.assertLess(len(done.stdout.splitlines()) - 1, 120)
         self.refused("hitting-set", "--points", p, "--disks", d, "--method", "local", "--start", self.write("s.csv", ["500"]), says=["s.csv", "500", "120 points"])
 
+    def test_the_tight_instance_stops_local_search_of_three_and_not_of_four(self):
+        p, d, s, out = (self.folder / name for name in ("p.csv", "d.csv", "s.csv", "out.csv"))
+        self.assertEqual(run("instance", "tight", "--side", 8, "--points", p, "--disks", d, "--start", s).returncode, 0)
+        sizes = {}
+        for k in (3, 4):
+            done = run("hitting-set", "--points", p, "--disks", d, "--method", "local", "--start", s, "--exchange", k, "--out", out)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            sizes[k] = len(rows(out.read_text()))
+        self.assertEqual(sizes[3], 4 * 8 * 8)
+        self.assertLess(sizes[4], 5 * 45)
+        done = run("instance", "rnd", "--count", 200, "--disk-count", 100, "--radius", 0.1, "--points", p, "--disks", d)
+        self.assertEqual((done.returncode, len(rows(p.read_text()))), (0, 200), done.stderr)
+        self.refused("instance", "fix", "--points", p, "--disks", d, "--start", s, says=["--start"])
+
+    def test_ranges_and_shapes_are_hit(self):
+        points, disks, p, d = self.instance()
+        square = self.write("square.csv", ["1,1", "-1,1", "-1,-1", "1,-1"])
+        inside = [[i for i, q in enumerate(points) if max(abs(q[0] - x), abs(q[1] - y)) <= r] for x, y, r in disks]
+        ranges = self.write("ranges.csv", [",".join(map(str, row)) for row in inside])
+        chosen = {}
+        for name, what in (("shape", ("--disks", d, "--shape", square)), ("ranges", ("--ranges", ranges))):
+            for method in ("default", "local"):
+                done = run("hitting-set", "--points", p, *what, "--method", method)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                chosen[name, method] = {int(row.split(",")[0]) for row in done.stdout.splitlines()[1:]}
+                self.assertTrue(all(chosen[name, method] & set(row) for row in inside), (name, method))
+        self.assertEqual(chosen["shape", "default"], chosen["ranges", "default"])
+        self.refused("hitting-set", "--points", p, "--ranges", self.write("r.csv", ["0,1", "5,120"]), says=["r.csv, line 2", "field 2", "120"])
+        self.refused("hitting-set", "--points", p, "--ranges", ranges, "--method", "dnet", says=["dnet"])
+        self.refused("hitting-set", "--points", p, "--disks", d, "--shape", self.write("s.csv", ["1,1", "1,-1"]), says=["shape"])
+
+    def test_an_independent_set_does_not_touch_itself(self):
+        _, disks, _, d = self.instance()
+        sizes = []
+        for k in (2, 3, 4):
+            done = run("independent-set", "--disks", d, "--exchange", k, "--picture", self.folder / "set.svg")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            found = rows(done.stdout)
+            sizes.append(len(found))
+            self.assertTrue(all(math.dist(a[1:3], b[1:3]) > a[3] + b[3] for a in found for b in found if a is not b))
+            self.assertTrue(all(disks[int(a[0])] == tuple(a[1:]) for a in found))
+        self.assertLessEqual(sizes[0], sizes[2])
+        self.refused("independent-set", "--disks", d, "--start", self.write("s.csv", ["90"]), says=["s.csv", "90 disks"])
+
     def test_nets_follow_weights_and_c0(self):
         points, _, p, _ = self.instance()
         if "without CGAL" in run("net", "--points", p).stderr:

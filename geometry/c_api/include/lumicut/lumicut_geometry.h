@@ -112,10 +112,31 @@ LUMICUT_GEOMETRY_API int lumicut_hitting_set(const double* points, size_t point_
                                              lumicut_hitting_set_info* info);
 LUMICUT_GEOMETRY_API int lumicut_hitting_set_greedy(const double* points, size_t point_count, const double* disks,
                                                     size_t disk_count, int pruned, lumicut_indices* chosen);
-/* Local search alone: up to `exchange` points (2 or 3) are given up for fewer, as long as it can be done. [Theorem 8.1] */
+/* Local search alone: up to `exchange` points (2 to 4) are given up for fewer, as long as it can be done. [Theorem 8.1] */
 LUMICUT_GEOMETRY_API int lumicut_hitting_set_improve(const double* points, size_t point_count, const double* disks,
                                                      size_t disk_count, const uint32_t* start, size_t start_count,
                                                      int exchange, lumicut_indices* chosen);
+
+/* The same for ranges of any kind: range i holds the points members[offsets[i]] to members[offsets[i + 1] - 1]; offsets:
+   range_count + 1 numbers. exchange 0: the solver of lumicut_hitting_set; 2 to 4: local search from `start`. info may be NULL,
+   and is written where exchange is 0. */
+LUMICUT_GEOMETRY_API int lumicut_hitting_set_of_ranges(size_t point_count, const size_t* offsets,
+                                                       const uint32_t* members, size_t range_count, int drop_empty,
+                                                       const uint32_t* start, size_t start_count, int exchange,
+                                                       lumicut_indices* chosen, lumicut_hitting_set_info* info);
+/* The points in copies of a convex polygon, which are pseudodisks: `shape` has its corners, counter-clockwise around the origin;
+   copies: x, y, size. offsets and members as above. */
+LUMICUT_GEOMETRY_API int lumicut_points_in_copies(const double* points, size_t point_count, const double* shape,
+                                                  size_t corner_count, const double* copies, size_t copy_count,
+                                                  size_t* offsets, lumicut_indices* members);
+/* The instance on which (3,2) local search is worst [Theorem 8.5]: small = (side + 1)(side + 2) / 2 points that hit all disks,
+   then 4 side^2 that do too and that it cannot improve; 9 side^2 disks. side: 1 to 300. */
+LUMICUT_GEOMETRY_API int lumicut_tight_instance(int side, double* points, double* disks);
+
+/* Many disks that do not touch each other: up to `exchange` - 1 (exchange 2 to 4) are given up for one more. start_count 0:
+   from small ones first. */
+LUMICUT_GEOMETRY_API int lumicut_independent_disks(const double* disks, size_t disk_count, int exchange,
+                                                   const uint32_t* start, size_t start_count, lumicut_indices* chosen);
 
 /* ---- Face clusters of triangle meshes [Carr and Hart 2004] ---- */
 typedef struct lumicut_face_clusters_t* lumicut_face_clusters;
