@@ -8,7 +8,7 @@ packages=(
   clang libclang-rt-dev llvm                                            # builds with sanitizers and names in their reports
   clang-format clang-tidy flake8 shellcheck                             # tools/dev/lint.sh
   libembree-dev libtbb-dev libhwy-dev libboost-dev                      # the library: rays, threads, SIMD, Student's t
-  libopenexr-dev libimath-dev libopenimageio-dev libtinyobjloader-dev libtinygltf-dev libassimp-dev libpugixml-dev   # the command's files
+  libopenexr-dev libimath-dev libopenimageio-dev libtinyobjloader-dev libtinygltf-dev libassimp-dev libpugixml-dev zlib1g-dev   # the command's files
   openimageio-tools                                                     # their CMake files ask for the programs too
   nlohmann-json3-dev libcli11-dev libfmt-dev                            # the command's words
   libcgal-dev libgmp-dev libmpfr-dev                                    # geometry/ (a target of its own)

@@ -10,9 +10,9 @@
 
 namespace lumicut::io {
 
-std::string shown(std::string_view text) {
+std::string shown(std::string_view text, size_t most) {
   std::string out;
-  for (const char c : text.substr(0, 60)) out += static_cast<unsigned char>(c) >= ' ' && c != '\x7f' ? c : '?';
+  for (const char c : text.substr(0, most)) out += static_cast<unsigned char>(c) >= ' ' && c != '\x7f' ? c : '?';
   return out;
 }
 

@@ -7,7 +7,7 @@
 namespace lumicut::io {
 
 // At most 60 bytes of it, without control characters: for messages.
-std::string shown(std::string_view text);
+std::string shown(std::string_view text, size_t most = 60);
 
 struct FoundFile {
   std::string path;    // "": none

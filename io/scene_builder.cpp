@@ -99,6 +99,17 @@ Geometry sphere_geometry() {
   return g;
 }
 
+Geometry sphere_part_geometry(double z0, double z1, double sweep) {
+  constexpr uint32_t kAround = 96, kUp = 48;
+  const double low = std::asin(std::clamp(z0, -1.0, 1.0)), high = std::asin(std::clamp(z1, -1.0, 1.0));
+  const double grow = polygon_growth(sweep / kAround);
+  return grid(kAround, kUp, [&](Geometry& g, double s, double t) {
+    const double phi = sweep * s, up = low + (high - low) * t;
+    const Vec n{std::cos(up) * std::cos(phi), std::cos(up) * std::sin(phi), std::sin(up)};
+    vertex(g, {n[0] * grow, n[1] * grow, n[2]}, n, s, t);
+  });
+}
+
 Geometry rectangle_geometry() {
   return grid(1, 1, [](Geometry& g, double s, double t) { vertex(g, {2 * s - 1, 2 * t - 1, 0}, {0, 0, 1}, s, t); });
 }
@@ -160,6 +171,12 @@ PaintRef power_paint(PaintRef base, double exponent) {
   return paint;
 }
 
+PaintRef behind_paint() {
+  auto paint = std::make_shared<Paint>();
+  paint->kind = Paint::Kind::behind;
+  return paint;
+}
+
 std::optional<Vec> constant_of(const PaintRef& paint) {
   const auto both = [&](auto&& combine) -> std::optional<Vec> {
     const auto a = constant_of(paint->a);
@@ -189,102 +206,20 @@ std::optional<Vec> constant_of(const PaintRef& paint) {
   }
 }
 
-Metal metal_of(const Vec& eta, const Vec& k) {
-  // Fresnel's equations for a conductor in air.
-  const auto reflectance = [](double c, double n, double absorbing) {
-    const double c2 = c * c, s2 = 1 - c2, n2 = n * n, k2 = absorbing * absorbing, t = n2 - k2 - s2;
-    const double both = std::sqrt(std::max(0.0, t * t + 4 * n2 * k2)), a = std::sqrt(std::max(0.0, 0.5 * (both + t)));
-    const double across = (both + c2 - 2 * a * c) / (both + c2 + 2 * a * c);
-    return 0.5 * across * (1 + (c2 * both + s2 * s2 - 2 * a * c * s2) / (c2 * both + s2 * s2 + 2 * a * c * s2));
-  };
-  Metal out;
-  const double c = std::cos(radians(82));
-  for (size_t i = 0; i < 3; ++i) {
-    const double f0 = std::clamp(reflectance(1, eta[i], k[i]), 0.0, 1.0);
-    const double schlick = f0 + (1 - f0) * std::pow(1 - c, 5);
-    out.colour[i] = f0;
-    out.tint[i] = schlick > 0 ? std::clamp(reflectance(c, eta[i], k[i]) / schlick, 1e-6, 1.0) : 1;
-  }
-  return out;
-}
-
-std::optional<std::pair<Vec, Vec>> named_metal(const std::string& name) {
-  static const std::map<std::string, std::pair<Vec, Vec>> kMetals = {
-      {"Cu", {{0.2004, 0.9240, 1.1022}, {3.9129, 2.4528, 2.1422}}},
-      {"Au", {{0.1431, 0.3750, 1.4424}, {3.9832, 2.3857, 1.6032}}},
-      {"Ag", {{0.1552, 0.1167, 0.1384}, {4.8283, 3.1225, 2.1470}}},
-      {"Al", {{1.6574, 0.8803, 0.5212}, {9.2238, 6.2695, 4.8370}}},
-      {"CuZn", {{0.4440, 0.5270, 1.0940}, {3.6950, 2.7650, 1.8290}}},
-      {"Cr", {{3.1071, 3.1812, 2.3230}, {3.3314, 3.3291, 3.1350}}}};
-  const auto found = kMetals.find(name);
-  if (found == kMetals.end()) return std::nullopt;
-  return found->second;
-}
-
-namespace {
-
-// CIE 1931 colour matching functions by the fit of Wyman, Sloan and Shirley (2013), multi-lobe.
-Vec colour_matching(double nm) {
-  const auto lobe = [&](double height, double middle, double below, double above) {
-    const double t = (nm - middle) * (nm < middle ? below : above);
-    return height * std::exp(-0.5 * t * t);
-  };
-  return {lobe(0.362, 442.0, 0.0624, 0.0374) + lobe(1.056, 599.8, 0.0264, 0.0323) - lobe(0.065, 501.1, 0.0490, 0.0382),
-          lobe(0.821, 568.8, 0.0213, 0.0247) + lobe(0.286, 530.9, 0.0613, 0.0322),
-          lobe(1.217, 437.0, 0.0845, 0.0278) + lobe(0.681, 459.0, 0.0385, 0.0725)};
-}
-Vec rgb_of_xyz(const Vec& c) {
-  Vec out{3.2404542 * c[0] - 1.5371385 * c[1] - 0.4985314 * c[2],
-          -0.9692660 * c[0] + 1.8760108 * c[1] + 0.0415560 * c[2],
-          0.0556434 * c[0] - 0.2040259 * c[1] + 1.0572252 * c[2]};
-  for (double& x : out) x = std::max(0.0, x);
-  return out;
-}
-
-}  // namespace
-
-Vec rgb_of_spectrum(const std::vector<std::pair<double, double>>& spectrum) {
-  if (spectrum.empty()) return {0, 0, 0};
-  Vec sum{0, 0, 0};
-  double white = 0;
-  for (double nm = 360; nm <= 830; nm += 1) {
-    const auto above =
-        std::lower_bound(spectrum.begin(), spectrum.end(), nm, [](const auto& s, double x) { return s.first < x; });
-    double value = 0;
-    if (above != spectrum.end() && above->first == nm) {
-      value = above->second;
-    } else if (above != spectrum.begin() && above != spectrum.end()) {
-      const auto below = above - 1;
-      value = below->second + (above->second - below->second) * (nm - below->first) / (above->first - below->first);
-    }
-    const Vec c = colour_matching(nm);
-    sum = sum + c * value;
-    white += c[1];
-  }
-  return rgb_of_xyz(sum * (1 / white));
-}
-
-Vec blackbody(double kelvin) {
-  std::vector<std::pair<double, double>> spectrum;
-  for (double nm = 360; nm <= 830; nm += 5) {
-    const double x = 1.438776877e7 / (nm * kelvin);
-    spectrum.emplace_back(nm, std::pow(nm / 560, -5) / (x < 700 ? std::expm1(x) : 1e304));
-  }
-  const Vec rgb = rgb_of_spectrum(spectrum);
-  const double luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-  return luminance > 0 ? rgb * (1 / luminance) : Vec{1, 0, 0};
-}
-
 // ---- The scene
 
 void SceneBuilder::fail(const std::string& where, const std::string& text) const {
   throw FileError(path_, where.empty() ? text : fmt::format("{}: {}", where, text));
 }
+namespace {
+constexpr size_t kLongest = 160;  // of a warning, which may quote the file
+}
 void SceneBuilder::leave_out(const std::string& what) {
-  if (told_.insert(what).second) scene.warnings.add("things left out", path_, fmt::format("{}: left out", shown(what)));
+  if (told_.insert(what).second)
+    scene.warnings.add("things left out", path_, fmt::format("{}: left out", shown(what, kLongest)));
 }
 void SceneBuilder::approximate(const std::string& what) {
-  if (told_.insert(what).second) scene.warnings.add("things approximated", path_, shown(what));
+  if (told_.insert(what).second) scene.warnings.add("things approximated", path_, shown(what, kLongest));
 }
 
 PaintRef SceneBuilder::made(Paint paint) const {
@@ -294,6 +229,18 @@ PaintRef SceneBuilder::made(Paint paint) const {
   auto out = std::make_shared<const Paint>(std::move(paint));
   if (const auto value = constant_of(out)) return constant_paint(*value);
   return out;
+}
+
+PaintRef SceneBuilder::product(const PaintRef& a, const PaintRef& b) const {
+  Paint out;
+  out.kind = Paint::Kind::product, out.a = a, out.b = b;
+  return made(out);
+}
+PaintRef SceneBuilder::mixed(const PaintRef& a, const PaintRef& b, const PaintRef& share) const {
+  if (a == b) return a;
+  Paint out;
+  out.kind = Paint::Kind::mix, out.a = a, out.b = b, out.share = share;
+  return made(out);
 }
 
 int32_t SceneBuilder::image(const std::string& name, TextureUse use, uint32_t flags) {
@@ -325,20 +272,31 @@ int32_t SceneBuilder::compile(const PaintRef& paint, Program& program) {
   constexpr uint32_t kAdd = 0, kSubtract = 1, kMultiply = 2, kMultiplyAdd = 4, kPower = 5, kFloor = 18,
                      kFlooredModulo = 25;
   const auto place = [&] {
-    const int32_t uv = step(LUMICUT_OP_UV, 0, {});
-    if (paint->uv[0] == 1 && paint->uv[1] == 1 && paint->uv[2] == 0 && paint->uv[3] == 0) return uv;
-    return step(LUMICUT_OP_VECTOR, kMultiplyAdd,
-                {uv, constant(paint->uv[0], paint->uv[1], 1), constant(paint->uv[2], paint->uv[3], 0)});
+    const auto& m = paint->place.to.m;
+    const int32_t from = step(paint->place.of_point ? LUMICUT_OP_POSITION : LUMICUT_OP_UV, 0, {});
+    if (m == Affine{}.m) return from;
+    if (!paint->place.of_point && m[1] == 0 && m[4] == 0)
+      return step(LUMICUT_OP_VECTOR, kMultiplyAdd, {from, constant(m[0], m[5], 1), constant(m[3], m[7], 0)});
+    const auto row = static_cast<uint32_t>(program.table.size());
+    for (const double x : m) program.table.push_back(static_cast<float>(x));
+    const int32_t out = step(LUMICUT_OP_TRANSFORM, 0, {from}, row);
+    program.instructions.back().count = 12;
+    return out;
   };
   switch (paint->kind) {
     case Paint::Kind::constant:
       return constant(paint->value[0], paint->value[1], paint->value[2]);
     case Paint::Kind::image:
-      return step(LUMICUT_OP_IMAGE, 0, {place()}, static_cast<uint32_t>(paint->texture));
+      return step(LUMICUT_OP_IMAGE, paint->mode, {place()}, static_cast<uint32_t>(paint->texture));
+    case Paint::Kind::axis:
+      return step(LUMICUT_OP_SEPARATE, paint->mode, {place()});
+    case Paint::Kind::behind:
+      return step(LUMICUT_OP_BEHIND, 0, {});
     case Paint::Kind::checker: {
       const int32_t cell = step(LUMICUT_OP_VECTOR, kFloor, {place()});
-      const int32_t sum =
+      int32_t sum =
           step(LUMICUT_OP_MATH, kAdd, {step(LUMICUT_OP_SEPARATE, 0, {cell}), step(LUMICUT_OP_SEPARATE, 1, {cell})});
+      if (paint->place.of_point) sum = step(LUMICUT_OP_MATH, kAdd, {sum, step(LUMICUT_OP_SEPARATE, 2, {cell})});
       const int32_t odd = step(LUMICUT_OP_MATH, kFlooredModulo, {sum, constant(2, 2, 2)});
       const int32_t a = compile(paint->a, program), b = compile(paint->b, program);
       return step(LUMICUT_OP_MIX, 0, {odd, a, b});
@@ -366,9 +324,11 @@ int32_t SceneBuilder::compile(const PaintRef& paint, Program& program) {
 }
 
 int32_t SceneBuilder::texture_of(const PaintRef& paint) {
-  if (paint->kind == Paint::Kind::image && paint->uv[0] == 1 && paint->uv[1] == 1 && paint->uv[2] == 0 &&
-      paint->uv[3] == 0)
+  if (paint->kind == Paint::Kind::image && paint->mode == 0 && !paint->place.of_point &&
+      paint->place.to.m == Affine{}.m) {
+    made_of_[paint->texture] = paint;
     return paint->texture;
+  }
   const auto found = painted_.find(paint.get());
   if (found != painted_.end()) return found->second.second;
   Program program;
@@ -380,13 +340,17 @@ int32_t SceneBuilder::texture_of(const PaintRef& paint) {
     in.inputs[1] = -static_cast<int32_t>(program.constants.size() / 3);
     program.instructions.push_back(in);
   }
+  const int32_t number = add_program(std::move(program));
+  painted_[paint.get()] = {paint, number};
+  made_of_[number] = paint;
+  return number;
+}
+int32_t SceneBuilder::add_program(Program program) {
   Texture texture;
   texture.file = fmt::format("texture {}", scene.textures.size() + 1);
   texture.program = std::move(program);
   scene.textures.push_back(std::move(texture));
-  const auto number = static_cast<int32_t>(scene.textures.size());
-  painted_[paint.get()] = {paint, number};
-  return number;
+  return static_cast<int32_t>(scene.textures.size());
 }
 
 // Scene files take the pictures of colours for sRGB and those of numbers for linear: what is the other way round becomes a
@@ -400,6 +364,28 @@ PaintRef SceneBuilder::decoded(const PaintRef& paint, bool colour) const {
   return out;
 }
 int32_t SceneBuilder::number_texture(const PaintRef& paint) { return texture_of(decoded(paint, false)); }
+
+void SceneBuilder::set_bump(const PaintRef& height, double scale, lumicut_material& m) {
+  if (constant_of(height) || scale == 0) return;
+  const int32_t heights = number_texture(height);
+  if (!scene.textures.at(static_cast<size_t>(heights) - 1).program) {
+    m.height_texture = heights, m.bump_distance = static_cast<float>(scale);
+    return;
+  }
+  Program program;
+  lumicut_instruction in{};
+  in.op = LUMICUT_OP_BUMP;
+  in.inputs[0] = compile(decoded(height, false), program);
+  for (const double x : {1.0, scale})
+    for (int k = 0; k < 3; ++k) program.constants.push_back(static_cast<float>(x));
+  in.inputs[2] = -static_cast<int32_t>(program.constants.size() / 3), in.inputs[1] = in.inputs[2] + 1;
+  lumicut_instruction normal{};
+  normal.op = LUMICUT_OP_NORMAL;
+  program.instructions.push_back(normal);
+  in.inputs[3] = static_cast<int32_t>(program.instructions.size() - 1);
+  program.instructions.push_back(in);
+  m.normal_texture = add_program(std::move(program)), m.normal_strength = 0;
+}
 
 void SceneBuilder::set_colour(const PaintRef& paint, float* factor, int32_t& texture, double most) {
   texture = 0;
@@ -438,12 +424,12 @@ uint32_t SceneBuilder::with_emission(uint32_t material, const Vec& radiance, int
 }
 
 void SceneBuilder::add(const std::string& name, const Geometry& geometry, const Affine& place, uint32_t material,
-                       bool flipped, const std::string& key) {
+                       bool flipped, const std::string& key, uint32_t mask) {
   for (const double v : place.m)
     if (!(std::abs(v) < kLargestCoordinate)) fail(name, fmt::format("its transform has the number {}", v));
   if (!(std::abs(place.determinant()) > 0)) return leave_out(name + ", which is scaled to nothing");
   if (geometry.indices.empty()) return;
-  const std::string whole = fmt::format("{} {} {}", key, material, flipped);
+  const std::string whole = fmt::format("{} {} {} {}", key, material, flipped, mask);
   if (!key.empty()) {
     const auto known = shared_.find(whole);
     if (known != shared_.end()) {
@@ -453,7 +439,7 @@ void SceneBuilder::add(const std::string& name, const Geometry& geometry, const 
     shared_[whole] = scene.meshes.size();
   }
   Mesh mesh;
-  mesh.name = name;
+  mesh.name = name, mesh.mask = mask;
   mesh.positions = geometry.positions, mesh.normals = geometry.normals, mesh.uvs = geometry.uvs,
   mesh.indices = geometry.indices;
   if (flipped) {
@@ -470,7 +456,7 @@ void SceneBuilder::add(const std::string& name, const Geometry& geometry, const 
 std::vector<Geometry> SceneBuilder::read_meshes(const std::string& name) {
   const FoundFile file = find_beside(path_, name);
   if (file.path.empty()) fail("", fmt::format("the mesh {} does not exist", shown(name)));
-  if (!is_model(file.path)) fail("", fmt::format("the mesh {} is of no format that is read here", shown(name)));
+  if (!has_meshes(file.path)) fail("", fmt::format("the mesh {} is of no format that is read here", shown(name)));
   std::vector<Geometry> out;
   for (Mesh& mesh : read_model_meshes(file.path, scene.warnings))
     out.push_back({std::move(mesh.positions), std::move(mesh.normals), std::move(mesh.uvs), std::move(mesh.indices)});
@@ -496,10 +482,30 @@ void SceneBuilder::add_profile_light(const Vec& position, const Vec& direction, 
   add_light(light, name);
 }
 
+void SceneBuilder::hide_emitters() {
+  if (scene.environment) scene.environment->flags |= LUMICUT_HIDDEN;
+  const auto emits = [&](uint32_t number) {
+    const float* e = scene.materials.at(number).values.emission;
+    return std::max({e[0], e[1], e[2]}) > 0;
+  };
+  constexpr uint32_t kAll = LUMICUT_CAMERA_RAYS | LUMICUT_DIFFUSE_RAYS | LUMICUT_GLOSSY_RAYS |
+                            LUMICUT_TRANSMISSION_RAYS | LUMICUT_SHADOW_RAYS;
+  for (Mesh& mesh : scene.meshes)
+    if (!mesh.materials.empty() && emits(mesh.materials[0]))
+      mesh.mask = (mesh.mask == 0 ? kAll : mesh.mask) & ~uint32_t{LUMICUT_CAMERA_RAYS};
+}
+
 SceneData SceneBuilder::finish(bool has_camera) {
   if (scene.meshes.empty()) fail("", "has no triangles: there is nothing to see");
   if (!has_camera) frame_scene(scene);
   if (!is_lit(scene)) add_sky(scene);
+  const auto factor = static_cast<float>(exposure);
+  for (lumicut_light& light : scene.lights) light.value *= factor;
+  for (Material& material : scene.materials)
+    for (float& x : material.values.emission) x *= factor;
+  if (scene.environment)
+    for (float& x : scene.environment->color) x *= factor;
+  if (!emitters_seen) hide_emitters();
   scene.file = path_;
   return std::move(scene);
 }

@@ -13,6 +13,7 @@
 
 #include "io/affine.h"
 #include "io/scene_data.h"
+#include "io/spectra.h"
 #include "io/texture_store.h"
 
 namespace lumicut::io {
@@ -33,6 +34,8 @@ struct Geometry {
 };
 // Of radius 1 about the origin, its area that of the sphere; u around z, v from -z (0) to z (1).
 Geometry sphere_geometry();
+// The part of it between these z, around as far as `sweep`.
+Geometry sphere_part_geometry(double z0, double z1, double sweep);
 // Corners -1 to 1 in the plane z = 0, towards z; uv 0 to 1 along x and y.
 Geometry rectangle_geometry();
 // Corners -1 to 1; each face has uv 0 to 1.
@@ -42,35 +45,31 @@ Geometry disk_geometry(double height, double radius, double inner, double sweep)
 // About the z axis, outwards, without lids.
 Geometry cylinder_geometry(double radius, double z0, double z1, double sweep);
 
+// Where on a texture a place of a surface is: `to` of (u, v, 0), or of the point in the world.
+struct TexturePlace {
+  Affine to;
+  bool of_point = false;
+};
+
 // What a material's value is made of: a constant, or what is computed at the hit.
 struct Paint;
 using PaintRef = std::shared_ptr<const Paint>;
 struct Paint {
-  enum class Kind { constant, image, checker, product, mix, invert, power };
+  enum class Kind { constant, image, checker, axis, behind, product, mix, invert, power };
   Kind kind = Kind::constant;
-  Vec value{0, 0, 0};           // constant; power: the exponent in [0]
-  int32_t texture = 0;          // image
-  double uv[4] = {1, 1, 0, 0};  // image, checker: scale and offset of u, v
-  PaintRef a, b, share;         // checker, product, mix: a where share is 0
-  size_t size = 1;              // with all that it is made of
+  Vec value{0, 0, 0};    // constant; power: the exponent in [0]
+  int32_t texture = 0;   // image
+  uint32_t mode = 0;     // image: as LUMICUT_OP_IMAGE has it; axis: which coordinate
+  TexturePlace place;    // image, checker (squares, or cubes), axis
+  PaintRef a, b, share;  // checker, product, mix: a where share is 0
+  size_t size = 1;       // with all that it is made of
 };
 PaintRef constant_paint(const Vec& value);
 PaintRef constant_paint(double value);
 PaintRef power_paint(PaintRef base, double exponent);
+PaintRef behind_paint();  // 1 where the back is seen
 // What it is without the place; nothing where it depends on that.
 std::optional<Vec> constant_of(const PaintRef& paint);
-
-// A metal of complex index of refraction, as base colour and tint at 82 degrees of the library's GGX.
-struct Metal {
-  Vec colour, tint;
-};
-Metal metal_of(const Vec& eta, const Vec& k);
-// eta and k of "Cu", "Au", "Ag", "Al" and the like in red, green and blue.
-std::optional<std::pair<Vec, Vec>> named_metal(const std::string& name);
-// Linear Rec.709 of a black body, of luminance 1.
-Vec blackbody(double kelvin);
-// Of power by wavelength in nm, linear between. A flat spectrum of 1 is what `flat` says: CIE's integral, or 1 for Y.
-Vec rgb_of_spectrum(const std::vector<std::pair<double, double>>& spectrum);
 
 class SceneBuilder {
  public:
@@ -89,6 +88,8 @@ class SceneBuilder {
 
   // What is made of others: a constant where they are, and never of more than 500.
   PaintRef made(Paint paint) const;
+  PaintRef product(const PaintRef& a, const PaintRef& b) const;
+  PaintRef mixed(const PaintRef& a, const PaintRef& b, const PaintRef& share) const;
 
   // A colour of a material: factor and texture. Values are cut to [0, most].
   void set_colour(const PaintRef& paint, float* factor, int32_t& texture, double most = 1);
@@ -96,14 +97,19 @@ class SceneBuilder {
   // Of the emission (a colour), and of an opacity.
   int32_t colour_texture(const PaintRef& paint) { return texture_of(decoded(paint, true)); }
   int32_t number_texture(const PaintRef& paint);
+  // The surface stands out by so much: `scale` of the world's lengths for a height of 1.
+  void set_bump(const PaintRef& height, double scale, lumicut_material& m);
 
   uint32_t add_material(const std::string& name, const lumicut_material& values);
   // The material with another emission.
   uint32_t with_emission(uint32_t material, const Vec& radiance, int32_t texture, bool both_sides);
+  // The first where share is 0, the second where it is 1. What no single material can be is approximated, by name.
+  uint32_t mix_materials(const std::string& name, uint32_t first, uint32_t second, const PaintRef& share);
 
   // `flipped`: what the winding says is the back. The same shape and material are stored once (`key`; "": alone).
+  // `mask`: the rays that see it, as lumicut_mesh has it.
   void add(const std::string& name, const Geometry& geometry, const Affine& place, uint32_t material, bool flipped,
-           const std::string& key = "");
+           const std::string& key = "", uint32_t mask = 0);
   // Meshes of a file, of any format that has no materials of its own or whose materials do not count.
   std::vector<Geometry> read_meshes(const std::string& name);
 
@@ -111,12 +117,19 @@ class SceneBuilder {
   // Lights of falloff by the angle to `direction`: linear between (radians, W/sr).
   void add_profile_light(const Vec& position, const Vec& direction, const Vec& colour, std::vector<float> angles,
                          std::vector<float> values, const std::string& name);
+  double exposure = 1;        // all light is multiplied by it
+  bool emitters_seen = true;  // by the camera
   // What is not there is put in its place.
   SceneData finish(bool has_camera);
 
  private:
   int32_t compile(const PaintRef& paint, Program& program);
   int32_t texture_of(const PaintRef& paint);
+  int32_t add_program(Program program);
+  void hide_emitters();
+  // What set_colour and set_number made these of.
+  PaintRef colour_of(const float* factor, int32_t texture) const;
+  PaintRef number_of(float factor, int32_t texture) const;
   PaintRef decoded(const PaintRef& paint, bool colour) const;
 
   std::string path_;
@@ -124,6 +137,7 @@ class SceneBuilder {
   std::map<std::string, size_t> shared_;
   std::set<std::string> told_;
   std::map<const Paint*, std::pair<PaintRef, int32_t>> painted_;
+  std::map<int32_t, PaintRef> made_of_;  // texture numbers
 };
 
 }  // namespace lumicut::io

@@ -15,8 +15,10 @@
 
 #include "io/file_error.h"
 #include "io/find_beside.h"
+#include "io/mitsuba_upgrade.h"
 #include "io/scene_builder.h"
 #include "io/scene_defaults.h"
+#include "io/serialized_mesh.h"
 #include "io/text_lines.h"
 
 namespace lumicut::io {
@@ -61,6 +63,7 @@ class Reader {
     const Node root = documents_.back().document_element();
     if (std::string(root.name()) != "scene")
       throw FileError(path, fmt::format("its first element is <{}>, not <scene>", shown(root.name())));
+    upgrade_mitsuba(root);
     for (const Node& child : root.children()) element(child);
     --depth_;
   }
@@ -79,10 +82,13 @@ class Reader {
       const auto known = ids_.find(text(node, "id"));
       if (known == ids_.end()) fail(node, "there is no such id");
       ids_[text(node, "as")] = known->second;
-    } else if (name == "integrator" || name == "sampler" || name == "path") {
-      if (name == "path") build_.leave_out("<path>: files are searched for beside the scene");
+    } else if (name == "integrator") {
+      integrator(node);
+    } else if (name == "path") {
+      build_.leave_out("<path>: files are searched for beside the scene");
     } else if (name == "medium") {
       build_.leave_out("media");
+    } else if (name == "sampler") {
     } else if (name == "bsdf" || name == "texture" || name == "spectrum") {
       remember(node);
     } else if (name == "emitter") {
@@ -96,6 +102,13 @@ class Reader {
     } else {
       build_.leave_out(fmt::format("<{}>", name));
     }
+  }
+  // What hides lamps may lie in an integrator that the outer one holds.
+  void integrator(const Node& node) {
+    if (++depth_ > kDeepest) fail(node, "integrators lie in each other without end");
+    if (truth(node, "hide_emitters", false)) build_.emitters_seen = false;
+    for (const Node& c : node.children("integrator")) integrator(c);
+    --depth_;
   }
   void remember(const Node& node) {
     if (node.attribute("id")) ids_[text(node, "id")] = node;
@@ -144,9 +157,26 @@ class Reader {
   }
   // The child that is called so; references are followed.
   Node child(const Node& node, const std::string& name) const {
+    asked_[node.hash_value()].insert(name);
     for (const Node& c : node.children())
       if (c.attribute("name") && text(c, "name") == name) return std::string(c.name()) == "ref" ? referred(c) : c;
     return {};
+  }
+  // What nothing here asked for.
+  void tell_unread(const Node& node, std::initializer_list<const char*> ignored = {}) {
+    std::set<std::string>& asked = asked_[node.hash_value()];
+    asked.insert(ignored.begin(), ignored.end());
+    for (const Node& c : node.children()) {
+      const std::string kind = c.name();
+      if (kind == "medium" || (kind == "ref" && std::string(referred(c).name()) == "medium")) {
+        build_.leave_out("media");
+        continue;
+      }
+      const bool value = kind != "bsdf" && kind != "ref" && kind != "emitter" && kind != "shape" && kind != "sampler" &&
+                         kind != "film";
+      if (value && c.attribute("name") && asked.count(text(c, "name")) == 0)
+        build_.leave_out(fmt::format("{} of {}", text(c, "name"), text(node, "type")));
+    }
   }
   Node referred(const Node& ref) const {
     const auto known = ids_.find(text(ref, "id"));
@@ -157,6 +187,12 @@ class Reader {
     const Node c = child(node, name);
     return c && c.attribute("value") && std::string(c.name()) != "texture" ? number_in(c, "value", otherwise)
                                                                            : otherwise;
+  }
+  // The same of a material, where a texture may stand.
+  double even_number(const Node& node, const char* name, double otherwise) {
+    if (const Node c = child(node, name); c && std::string(c.name()) == "texture")
+      build_.leave_out(fmt::format("textures of {}", name));
+    return number(node, name, otherwise);
   }
   std::string word(const Node& node, const char* name, const std::string& otherwise) const {
     const Node c = child(node, name);
@@ -232,49 +268,80 @@ class Reader {
 
   // ---- Colours
 
+  static double linear(double c) { return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4); }
+  static Vec in_rgb(const Spectrum& spectrum, bool light) {
+    return light ? rgb_of_spectrum(spectrum) : rgb_of_reflectance(spectrum);
+  }
+  Spectrum pairs(const Node& node, const std::string& from) const {
+    const auto list = numbers(node, from);
+    if (list.size() < 2 || list.size() % 2 != 0) fail(node, fmt::format("has {} numbers, not pairs", list.size()));
+    Spectrum out;
+    for (size_t i = 0; i + 1 < list.size(); i += 2) out.emplace_back(list[i], list[i + 1]);
+    std::sort(out.begin(), out.end());
+    return out;
+  }
+  static std::string without_comments(std::string from) {
+    for (size_t at = 0; (at = from.find('#', at)) != std::string::npos;)
+      from.erase(at, std::min(from.find('\n', at), from.size()) - at);
+    return from;
+  }
+  Spectrum spectrum_of(const Node& node, const std::string& type) const {
+    const auto values = numbers(node, word(node, "values", ""));
+    std::vector<double> lengths = numbers(node, word(node, "wavelengths", ""));
+    if (type == "regular") {
+      lengths.clear();
+      const double first = number(node, "wavelength_min", 360), last = number(node, "wavelength_max", 830);
+      for (size_t i = 0; i < values.size(); ++i)
+        lengths.push_back(first + (last - first) * double(i) / std::max<double>(1, double(values.size()) - 1));
+    }
+    if (values.empty() || lengths.size() != values.size())
+      fail(node, fmt::format("has {} values at {} wavelengths", values.size(), lengths.size()));
+    Spectrum out;
+    for (size_t i = 0; i < values.size(); ++i) out.emplace_back(lengths[i], values[i]);
+    std::sort(out.begin(), out.end());
+    return out;
+  }
   Vec colour(const Node& node, bool light) {
     const std::string kind = node.name();
     const std::string value = text(node, "value");
-    if (kind == "rgb" && value.starts_with('#')) {
+    if ((kind == "rgb" || kind == "srgb") && value.starts_with('#')) {
       if (value.size() != 7) fail(node, "is no colour of six digits");
       Vec out;
       for (size_t k = 0; k < 3; ++k) {
         int byte = 0;
         const auto [end, error] = std::from_chars(&value[1 + 2 * k], &value[3 + 2 * k], byte, 16);
         if (error != std::errc() || end != &value[3 + 2 * k]) fail(node, "is no colour of six digits");
-        const double c = byte / 255.0;
-        out[k] = c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+        out[k] = linear(byte / 255.0);
       }
       return out;
+    }
+    if (kind == "spectrum" && node.attribute("type")) {
+      const std::string type = text(node, "type");
+      if (type == "blackbody")
+        return blackbody_radiance(std::clamp(number(node, "temperature", 5000), 100.0, 1e6)) * number(node, "scale", 1);
+      if (type == "d65" || type == "uniform") {
+        const double scale = number(node, type == "d65" ? "scale" : "value", 1);
+        return {scale, scale, scale};
+      }
+      if (type == "irregular" || type == "regular") return in_rgb(spectrum_of(node, type), light);
+      build_.approximate(fmt::format("spectra of the kind {} are grey", type));
+      return {0.5, 0.5, 0.5};
+    }
+    if (kind == "spectrum" && node.attribute("filename")) {
+      const std::string name = text(node, "filename");
+      const FoundFile file = find_beside(build_.path(), name);
+      if (file.path.empty()) fail(node, fmt::format("the file {} does not exist", shown(name)));
+      return in_rgb(pairs(node, without_comments(read_whole_file(file.path, kMostBytes))), light);
     }
     if (kind == "spectrum" && value.find(':') != std::string::npos) {
       std::string plain = value;
       std::replace(plain.begin(), plain.end(), ':', ' ');
-      const auto list = numbers(node, plain);
-      std::vector<std::pair<double, double>> spectrum;
-      for (size_t i = 0; i + 1 < list.size(); i += 2) spectrum.emplace_back(list[i], list[i + 1]);
-      std::sort(spectrum.begin(), spectrum.end());
-      Vec rgb = rgb_of_spectrum(spectrum);
-      if (light) return rgb;
-      const Vec flat = rgb_of_spectrum({{300, 1}, {900, 1}});
-      for (size_t k = 0; k < 3; ++k) rgb[k] /= flat[k];
-      return rgb;
+      return in_rgb(pairs(node, plain), light);
     }
-    if (kind == "spectrum" && node.attribute("type")) {
-      if (text(node, "type") == "blackbody") {
-        build_.approximate("black bodies have a luminance of 1");
-        return blackbody(std::clamp(number(node, "temperature", 5000), 100.0, 1e6));
-      }
-      if (text(node, "type") == "d65" || text(node, "type") == "uniform") {
-        const double scale = number(node, text(node, "type") == "d65" ? "scale" : "value", 1);
-        return {scale, scale, scale};
-      }
-      build_.approximate(fmt::format("spectra of the kind {} are grey", text(node, "type")));
-      return {0.5, 0.5, 0.5};
-    }
-    if (kind == "spectrum" && !node.attribute("value")) {
-      build_.approximate("spectra of files are grey");
-      return {0.5, 0.5, 0.5};
+    if (kind == "srgb") {
+      Vec out = vector_of(node, {0, 0, 0});
+      for (double& c : out) c = linear(c);
+      return out;
     }
     const auto list = numbers(node, value);
     if (list.size() == 1) return {list[0], list[0], list[0]};
@@ -300,16 +367,15 @@ class Reader {
     const std::string kind = text(node, "type");
     if (const Node to_uv = child(node, "to_uv")) {
       const Affine m = transform(to_uv);
-      if (m.m[1] != 0 || m.m[4] != 0) build_.approximate("turned textures are not turned");
       // In coordinates whose v counts from below.
-      out.uv[0] = m.m[0], out.uv[1] = m.m[5], out.uv[2] = m.m[3], out.uv[3] = 1 - m.m[5] - m.m[7];
+      out.place.to.m = {m.m[0], -m.m[1], 0, m.m[3] + m.m[1], -m.m[4], m.m[5], 0, 1 - m.m[5] - m.m[7], 0, 0, 1, 0};
     }
     if (kind == "bitmap") {
       const std::string wrap = word(node, "wrap_mode", "repeat");
       uint32_t flags = wrap == "clamp" ? uint32_t{LUMICUT_CLAMP} : 0u;
-      if (wrap == "mirror") build_.approximate("mirrored textures repeat");
+      if (wrap == "mirror") out.mode = 2;
       if (word(node, "filter_type", "bilinear") == "nearest") flags |= LUMICUT_NEAREST;
-      const bool raw = numbers_alone || truth(node, "raw", false);
+      const bool raw = truth(node, "raw", false) || numbers_alone;
       out.kind = Paint::Kind::image;
       out.texture = build_.image(word(node, "filename", ""), raw ? TextureUse::numbers : TextureUse::colour, flags);
       result = out.texture != 0 ? build_.made(out) : constant_paint(0.5);
@@ -317,12 +383,14 @@ class Reader {
       out.kind = Paint::Kind::checker;
       out.a = paint(node, "color0", 0.4), out.b = paint(node, "color1", 0.2);
       // Two squares a unit; the first lies where u and v are 0, which is above.
-      for (double& x : out.uv) x *= 2;
+      for (double& x : out.place.to.m) x *= 2;
       result = build_.made(out);
     } else {
       build_.approximate(fmt::format("textures of the kind {} are grey", kind));
       result = constant_paint(0.5);
+      for (const Node& c : node.children()) child(node, text(c, "name"));
     }
+    tell_unread(node, {"to_uv", "format", "accel"});
     --depth_;
     return paints_[key] = result;
   }
@@ -354,7 +422,7 @@ class Reader {
     if (word(node, "distribution", "beckmann") != "ggx") build_.approximate("Beckmann's distribution is taken as GGX");
     const char* name = "alpha";
     if (child(node, "alpha_u")) {
-      name = "alpha_u";
+      name = "alpha_u", child(node, "alpha_v");
       build_.approximate("roughness that differs along u and v is taken as that along u");
     }
     build_.set_number(power_paint(paint(node, name, usual, true), 0.5), m.roughness, m.roughness_texture);
@@ -382,8 +450,9 @@ class Reader {
     const std::string kind = text(node, "type");
     const std::string name = node.attribute("id") ? text(node, "id") : kind;
     if (kind == "twosided") {
-      const Node c = inner(node);
-      return c ? bsdf(c) : grey_;
+      const Node front = inner(node), back = inner(node, 1);
+      if (!front) fail(node, "holds no bsdf");
+      return back ? build_.mix_materials(name, bsdf(front), bsdf(back), behind_paint()) : bsdf(front);
     }
     if (kind == "mask" || kind == "bumpmap" || kind == "normalmap" || kind == "blendbsdf")
       return wrapped(node, kind, name);
@@ -399,13 +468,14 @@ class Reader {
     if (kind == "diffuse") {
       m = default_material();
       build_.set_colour(paint(node, "reflectance", 0.5), m.diffuse, m.diffuse_texture);
-    } else if (kind == "plastic" || kind == "roughplastic") {
+    } else if (kind == "plastic" || kind == "roughplastic" || kind == "pplastic") {
       build_.set_colour(paint(node, "diffuse_reflectance", 0.5), m.diffuse, m.diffuse_texture);
       m.ior = relative_index(node, "polypropylene");
       if (const Node c = child(node, "specular_reflectance"))
         if (const auto value = constant_of(paint_of(c, false)))
           for (size_t k = 0; k < 3; ++k) m.specular[k] = static_cast<float>(std::clamp((*value)[k], 0.0, 1.0));
-      if (kind == "roughplastic") set_alpha(node, m, 0.1);
+      if (kind != "plastic") set_alpha(node, m, 0.1);
+      truth(node, "nonlinear", false);
     } else if (kind == "dielectric" || kind == "roughdielectric" || kind == "thindielectric") {
       m.transmission = 1;
       m.ior = relative_index(node, "bk7");
@@ -426,21 +496,31 @@ class Reader {
       } else {
         m.ior = static_cast<float>(std::clamp(number(node, "eta", 1.5), 0.1, 10.0));
       }
-      m.transmission = static_cast<float>(std::clamp(number(node, "spec_trans", 0), 0.0, 1.0));
-      m.coat = static_cast<float>(std::clamp(number(node, "clearcoat", 0) / 4, 0.0, 1.0));
+      m.transmission = static_cast<float>(std::clamp(even_number(node, "spec_trans", 0), 0.0, 1.0));
+      if (kind == "principledthin") {
+        if (m.transmission > 0) m.flags |= LUMICUT_SHADOWS_PASS;
+        const double through = std::clamp(even_number(node, "diff_trans", 0), 0.0, 2.0) / 2;
+        const PaintRef base = paint(node, "base_color", 0.5);
+        build_.set_colour(build_.product(base, constant_paint(1 - through)), m.diffuse, m.diffuse_texture);
+        if (through > 0)
+          build_.set_colour(build_.product(base, constant_paint(through)), m.translucency, m.translucency_texture);
+      }
+      m.coat = static_cast<float>(std::clamp(even_number(node, "clearcoat", 0) / 4, 0.0, 1.0));
       // Its alpha is .1 without gloss, .001 with all of it.
-      m.coat_roughness =
-          static_cast<float>(std::sqrt(0.1 + (0.001 - 0.1) * std::clamp(number(node, "clearcoat_gloss", 0), 0.0, 1.0)));
+      m.coat_roughness = static_cast<float>(
+          std::sqrt(0.1 + (0.001 - 0.1) * std::clamp(even_number(node, "clearcoat_gloss", 0), 0.0, 1.0)));
       m.flags |= LUMICUT_BURLEY;
-      for (const char* key : {"anisotropic", "sheen", "sheen_tint", "flatness", "spec_tint", "diff_trans"})
-        if (number(node, key, 0) > 0) build_.leave_out(fmt::format("{} of {}", key, kind));
+      for (const char* key : {"anisotropic", "sheen", "sheen_tint", "flatness", "spec_tint"})
+        if (even_number(node, key, 0) > 0) build_.leave_out(fmt::format("{} of {}", key, kind));
     } else if (kind == "null") {
       m = default_material();
       m.opacity = kHole;
     } else {
       build_.approximate(fmt::format("bsdfs of the kind {} are diffuse", kind));
       m = default_material();
+      for (const Node& c : node.children()) child(node, text(c, "name"));
     }
+    tell_unread(node);
     return build_.add_material(name, m);
   }
 
@@ -457,8 +537,8 @@ class Reader {
       else
         build_.approximate(fmt::format("the metal {} is copper", material));
     }
-    if (const Node c = child(node, "eta")) both.first = colour(c, true);
-    if (const Node c = child(node, "k")) both.second = colour(c, true);
+    if (const Node c = child(node, "eta")) both.first = colour(c, false);
+    if (const Node c = child(node, "k")) both.second = colour(c, false);
     const Metal metal = metal_of(both.first, both.second);
     const Vec tint = constant_of(paint(node, "specular_reflectance", 1.0)).value_or(Vec{1, 1, 1});
     for (size_t k = 0; k < 3; ++k) {
@@ -483,13 +563,11 @@ class Reader {
       if (map) m.normal_texture = build_.image(word(map, "filename", ""), TextureUse::vectors, 0);
     } else if (kind == "bumpmap") {
       const Node map = texture_in(node);
-      if (map) m.height_texture = build_.image(word(map, "filename", ""), TextureUse::numbers, 0);
-      m.bump_distance = static_cast<float>(std::clamp(number(node, "scale", 1), -1e6, 1e6));
+      if (map) build_.set_bump(paint_of(map, true), std::clamp(number(node, "scale", 1), -1e6, 1e6), m);
     } else {
-      const double weight = constant_of(paint(node, "weight", 0.5, true)).value_or(Vec{0.5, 0.5, 0.5})[0];
-      build_.approximate("a blend of bsdfs is the one that it has more of");
       const Node second = inner(node, 1);
-      return weight > 0.5 && second ? bsdf(second) : of;
+      if (!second) fail(node, "holds one bsdf alone");
+      return build_.mix_materials(name, of, bsdf(second), paint(node, "weight", 0.5, true));
     }
     return build_.add_material(name, m);
   }
@@ -561,12 +639,13 @@ class Reader {
       for (size_t r = 0; r < 3; ++r) stand.m[4 * r] = x[r], stand.m[4 * r + 1] = y[r], stand.m[4 * r + 2] = z[r];
       place = place * stand;
       all.push_back(upside_down(cylinder_geometry(number(node, "radius", 1), 0, length(p1 - p0), 2 * kPi)));
-    } else if (kind == "obj" || kind == "ply") {
-      all = build_.read_meshes(word(node, "filename", ""));
+    } else if (kind == "obj" || kind == "ply" || kind == "serialized") {
+      all = kind == "serialized" ? serialized(node) : build_.read_meshes(word(node, "filename", ""));
       const bool turn = truth(node, "flip_tex_coords", kind == "obj") != (kind == "obj");
+      const bool flat = truth(node, "face_normals", false);
       for (Geometry& g : all) {
-        if (truth(node, "face_normals", false)) g.normals.clear();
-        if (turn != (kind == "ply")) g = upside_down(std::move(g));
+        if (flat) g.normals.clear();
+        if (turn != (kind != "obj")) g = upside_down(std::move(g));
       }
     } else {
       build_.leave_out(fmt::format("shapes of the kind {}", kind));
@@ -575,7 +654,8 @@ class Reader {
     }
     uint32_t material = grey_;
     if (const Node c = inner(node)) material = bsdf(c);
-    for (const Node& c : node.children())
+    for (const Node& inside : node.children()) {
+      const Node c = std::string(inside.name()) == "ref" ? referred(inside) : inside;
       if (std::string(c.name()) == "emitter") {
         if (text(c, "type") != "area") fail(c, "a shape emits as \"area\" alone");
         if (!group.empty()) {
@@ -588,8 +668,11 @@ class Reader {
         } else {
           material = build_.with_emission(material, radiance ? colour(radiance, true) : Vec{1, 1, 1}, 0, false);
         }
+        tell_unread(c);
         key.clear();
       }
+    }
+    tell_unread(node, {"to_world"});
     const std::string name = node.attribute("id") ? text(node, "id") : fmt::format("shape \"{}\"", kind);
     if (group.empty()) {
       for (const Geometry& g : all) build_.add(name, g, place, material, flipped, key);
@@ -597,6 +680,14 @@ class Reader {
       groups_[group].push_back({std::move(all), place, material, flipped, name});
     }
     --depth_;
+  }
+  std::vector<Geometry> serialized(const Node& node) {
+    const std::string name = word(node, "filename", "");
+    const FoundFile file = find_beside(build_.path(), name);
+    if (file.path.empty()) fail(node, fmt::format("the mesh {} does not exist", shown(name)));
+    const double index = number(node, "shape_index", 0);
+    if (!(index >= 0 && index < 1e9)) fail(node, fmt::format("its shape_index is {}", index));
+    return {read_serialized_mesh(file.path, static_cast<size_t>(index))};
   }
   void instance(const Node& node, const Affine& place) {
     for (const Node& c : node.children()) {
@@ -627,6 +718,11 @@ class Reader {
       build_.scene.width = static_cast<uint32_t>(width), build_.scene.height = static_cast<uint32_t>(height);
       if (child(film, "crop_width")) build_.leave_out("the film's crop");
     }
+    for (const char* key : {"near_clip", "far_clip"}) {
+      const double clip = number(node, key, 0);
+      if (!(clip >= 0 && clip < 1e17)) fail(node, fmt::format("its {} is {}", key, clip));
+      (key[0] == 'n' ? build_.scene.camera.near_clip : build_.scene.camera.far_clip) = static_cast<float>(clip);
+    }
     const Affine world = place_of(node);
     if (!(std::abs(world.determinant()) > 0)) fail(node, "its to_world flattens space");
     lumicut_camera& c = build_.scene.camera;
@@ -653,6 +749,7 @@ class Reader {
       c.focus_distance = static_cast<float>(number(node, "focus_distance", 1));
     }
     has_camera_ = true;
+    tell_unread(node, {"to_world", "shutter_open", "shutter_close", "focal_length", "fov", "fov_axis"});
   }
   double field_of_view(const Node& node, double aspect) const {
     std::string axis = word(node, "fov_axis", "x");
@@ -735,7 +832,9 @@ class Reader {
       build_.scene.environment = e;
     } else {
       build_.leave_out(fmt::format("emitters of the kind {}", kind));
+      return;
     }
+    tell_unread(node, {"to_world", "sampling_weight", "position", "direction"});
   }
 
   SceneBuilder build_;
@@ -745,6 +844,7 @@ class Reader {
   std::map<std::pair<size_t, bool>, PaintRef> paints_;
   std::map<size_t, uint32_t> materials_;
   std::map<std::string, std::vector<Part>> groups_;
+  mutable std::map<size_t, std::set<std::string>> asked_;  // names, by node
   std::optional<Geometry> sphere_;
   uint32_t grey_ = 0;
   int depth_ = 0;

@@ -9,6 +9,7 @@
 
 #include "io/file_error.h"
 #include "io/find_beside.h"
+#include "io/gzip.h"
 #include "io/isolated.h"
 #include "io/model.h"
 #include "io/module.h"
@@ -120,7 +121,29 @@ bool is_model(const std::string& path) {
   return kEndings.count(ending_of(path)) != 0;
 }
 
+bool has_meshes(const std::string& path) {
+  return is_model(path) || (ending_of(path) == ".gz" && ending_of(fs::path(path).stem().string()) == ".ply");
+}
+
 std::vector<Mesh> read_model_meshes(const std::string& path, Warnings& warnings) {
+  if (ending_of(path) == ".gz") {
+    constexpr uint64_t kMost = uint64_t{4} << 30;
+    check_regular_file(path);
+    const UnpackFolder folder;
+    const std::string file = (folder.path() / fs::path(path).stem().filename()).string();
+    std::ofstream out(file, std::ios::binary);
+    const std::string bytes = unpacked(read_whole_file(path, kMost), kMost, path);
+    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    out.close();
+    if (!out) throw FileError(file, "cannot be written");
+    try {
+      return read_model_meshes(file, warnings);
+    } catch (const FileError& error) {
+      std::string text = error.what();
+      if (const size_t at = text.find(file); at != std::string::npos) text.replace(at, file.size(), path);
+      throw FileError(text);
+    }
+  }
   if (ending_of(path) == ".obj") {
     std::vector<Texture> none;
     TextureStore textures(none);

@@ -14,7 +14,9 @@ bool is_model(const std::string& path);  // by its ending
 // Throws FileError, which names the file.
 SceneData read_model(const std::string& path);
 
-// Its meshes alone, for scene files that name it; their materials mean nothing. Throws FileError.
+// Its meshes alone, for scene files that name it; their materials mean nothing. A PLY may be packed by gzip (.ply.gz).
+// Throws FileError.
+bool has_meshes(const std::string& path);  // by its ending
 std::vector<Mesh> read_model_meshes(const std::string& path, Warnings& warnings);
 
 }  // namespace lumicut::io

@@ -10,9 +10,13 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
+#include <tuple>
 
 #include "io/file_error.h"
 #include "io/find_beside.h"
+#include "io/loop_subdivision.h"
+#include "io/pbrt_tokens.h"
 #include "io/scene_builder.h"
 #include "io/scene_defaults.h"
 #include "io/text_lines.h"
@@ -21,136 +25,20 @@ namespace lumicut::io {
 
 namespace {
 
-constexpr size_t kDeepest = 64;                     // of files that include each other, and of attributes
-constexpr uint64_t kMostBytes = uint64_t{4} << 30;  // of all files together
+constexpr size_t kDeepest = 1024;  // of attributes
 constexpr size_t kMostInstances = 1 << 24;
 
-struct Token {
-  std::string text;
-  bool quoted = false;
-  int line = 0;
-};
-
-// The words of a file and of those that it includes.
-class Tokens {
- public:
-  explicit Tokens(const std::string& path) { open(path); }
-
-  void open(const std::string& path) {
-    if (files_.size() >= kDeepest) throw FileError(path, "files include each other without end");
-    Source source{path, plain_text(read_whole_file(path, kMostBytes), path), 0, 1};
-    bytes_ += source.text.size();
-    if (bytes_ > kMostBytes) throw FileError(path, "the scene's files are too long together");
-    files_.push_back(std::move(source));
-  }
-  std::string where() const { return fmt::format("line {}", line_); }  // of the last word
-  const std::string& file() const { return files_.empty() ? last_ : files_.back().path; }
-
-  std::optional<Token> next() {
-    auto token = ahead_ ? std::exchange(ahead_, std::nullopt) : find();
-    if (token) line_ = token->line;
-    return token;
-  }
-  const std::optional<Token>& peek() {
-    if (!ahead_) ahead_ = find();
-    return ahead_;
-  }
-  [[noreturn]] void fail(const std::string& text) const {
-    throw FileError(file(), fmt::format("{}: {}", where(), text));
-  }
-
- private:
-  struct Source {
-    std::string path, text;
-    size_t at;
-    int line;
-  };
-
-  std::optional<Token> find() {
-    while (!files_.empty()) {
-      if (auto token = read(files_.back())) return token;
-      last_ = files_.back().path;
-      files_.pop_back();
-    }
-    return std::nullopt;
-  }
-  std::optional<Token> read(Source& s) {
-    const std::string& t = s.text;
-    while (s.at < t.size()) {
-      const char c = t[s.at];
-      if (c == '#') {
-        while (s.at < t.size() && t[s.at] != '\n') ++s.at;
-      } else if (c == ' ' || c == '\t' || c == '\n' || c == '\r') {
-        s.line += c == '\n';
-        ++s.at;
-      } else {
-        break;
-      }
-    }
-    if (s.at >= t.size()) return std::nullopt;
-    Token token;
-    token.line = s.line;
-    if (t[s.at] == '"') {
-      token.quoted = true;
-      for (++s.at; s.at < t.size() && t[s.at] != '"'; ++s.at) {
-        if (t[s.at] == '\n') fail("a text does not end in its line");
-        if (t[s.at] == '\\' && s.at + 1 < t.size()) ++s.at;
-        token.text += t[s.at];
-      }
-      if (s.at >= t.size()) fail("a text does not end");
-      ++s.at;
-    } else if (t[s.at] == '[' || t[s.at] == ']') {
-      token.text = t[s.at++];
-    } else {
-      while (s.at < t.size() && std::strchr(" \t\n\r\"[]#", t[s.at]) == nullptr) token.text += t[s.at++];
-    }
-    return token;
-  }
-
-  std::vector<Source> files_;
-  std::optional<Token> ahead_;
-  std::string last_;
-  int line_ = 1;
-  uint64_t bytes_ = 0;
-};
-
-struct Parameter {
-  std::string type, name;
-  std::vector<double> numbers;
-  std::vector<std::string> words;
-};
-
-class Parameters {
- public:
-  std::vector<Parameter> list;
-
-  const Parameter* find(const std::string& name) const {
-    for (const Parameter& p : list)
-      if (p.name == name) return &p;
-    return nullptr;
-  }
-  double number(const std::string& name, double otherwise) const {
-    const Parameter* p = find(name);
-    return p != nullptr && !p->numbers.empty() ? p->numbers[0] : otherwise;
-  }
-  Vec vector(const std::string& name, const Vec& otherwise) const {
-    const Parameter* p = find(name);
-    return p != nullptr && p->numbers.size() >= 3 ? Vec{p->numbers[0], p->numbers[1], p->numbers[2]} : otherwise;
-  }
-  std::string word(const std::string& name, const std::string& otherwise) const {
-    const Parameter* p = find(name);
-    return p != nullptr && !p->words.empty() ? p->words[0] : otherwise;
-  }
-  bool truth(const std::string& name, bool otherwise) const {
-    return word(name, otherwise ? "true" : "false") == "true";
-  }
+struct Parameters : PbrtParameters {
+  std::set<std::string> given;  // by Attribute
 };
 
 struct State {
   Affine ctm;
   bool reversed = false, nothing = false;  // nothing: a border between media
+  bool still = true;                       // transforms are those at the beginning of the frame
   uint32_t material = 0;
   std::optional<Parameters> area_light;
+  std::map<std::string, PbrtParameters> given;  // by Attribute to shapes, lights, materials ...
 };
 
 // A shape of an object that is placed later.
@@ -160,6 +48,7 @@ struct Part {
   Affine place;
   uint32_t material;
   bool flipped;
+  uint32_t mask;
 };
 
 class Reader {
@@ -187,14 +76,6 @@ class Reader {
     if (!token || !token->quoted) tokens_.fail(fmt::format("{} needs a text in quotes", what));
     return token->text;
   }
-  double number_of(const Token& token, const char* what) {
-    double value = 0;
-    const char* begin = token.text.data() + (token.text.starts_with('+') ? 1 : 0);
-    const auto [end, error] = std::from_chars(begin, token.text.data() + token.text.size(), value);
-    if (token.quoted || error != std::errc() || end != token.text.data() + token.text.size() || !std::isfinite(value))
-      tokens_.fail(fmt::format("{}: \"{}\" is no finite number", what, shown(token.text)));
-    return value;
-  }
   std::vector<double> numbers(size_t count, const char* what) {
     std::vector<double> out;
     const bool bracket = tokens_.peek() && tokens_.peek()->text == "[" && !tokens_.peek()->quoted;
@@ -202,50 +83,36 @@ class Reader {
     for (size_t i = 0; i < count; ++i) {
       const auto token = tokens_.next();
       if (!token) tokens_.fail(fmt::format("{} needs {} numbers", what, count));
-      out.push_back(number_of(*token, what));
+      out.push_back(pbrt_number(tokens_, *token, what));
     }
-    if (bracket && tokens_.next().value_or(Token{}).text != "]")
+    if (bracket && tokens_.next().value_or(PbrtToken{}).text != "]")
       tokens_.fail(fmt::format("{} has more than {} numbers", what, count));
     return out;
   }
-  Parameters parameters() {
-    Parameters out;
-    while (tokens_.peek() && tokens_.peek()->quoted) {
-      const std::string head = tokens_.next()->text;
-      Parameter p;
-      const size_t begin = std::min(head.find_first_not_of(" \t"), head.size()), gap = head.find_first_of(" \t", begin);
-      if (gap == std::string::npos) tokens_.fail(fmt::format("\"{}\" is no type and name of a parameter", shown(head)));
-      p.type = head.substr(begin, gap - begin);
-      const size_t name = std::min(head.find_first_not_of(" \t", gap), head.size());
-      p.name = head.substr(name, head.find_last_not_of(" \t") + 1 - name);
-      const auto add = [&](const Token& token) {
-        if (token.quoted || token.text == "true" || token.text == "false")
-          p.words.push_back(token.text);
-        else
-          p.numbers.push_back(number_of(token, p.name.c_str()));
-      };
-      auto token = tokens_.next();
-      if (token && token->text == "[" && !token->quoted) {
-        for (token = tokens_.next(); token && (token->quoted || token->text != "]"); token = tokens_.next())
-          add(*token);
-        if (!token) tokens_.fail(fmt::format("the values of \"{}\" do not end", shown(p.name)));
-      } else if (token) {
-        add(*token);
-      } else {
-        tokens_.fail(fmt::format("\"{}\" has no value", shown(p.name)));
+  // With those that Attribute gives to all statements of that kind.
+  Parameters parameters(const char* target = "") {
+    Parameters out{pbrt_parameters(tokens_), {}};
+    if (const auto given = state_.given.find(target); given != state_.given.end())
+      for (const PbrtParameter& p : given->second.list) {
+        out.list.push_back(p);
+        out.given.insert(p.name);
       }
-      if (p.numbers.empty() && p.words.empty()) tokens_.fail(fmt::format("\"{}\" has no value", shown(p.name)));
-      out.list.push_back(std::move(p));
-    }
     return out;
+  }
+  // What nothing here asks for.
+  void tell_unread(const std::string& what, const Parameters& p) {
+    for (const std::string& name : p.unread())
+      if (p.given.count(name) == 0) build_.leave_out(fmt::format("\"{}\" of {}", name, what));
   }
 
   // ---- Statements
 
   void statement(const std::string& word) {
-    const auto times = [&](const Affine& m) { state_.ctm = state_.ctm * m; };
+    const auto times = [&](const Affine& m) {
+      if (state_.still) state_.ctm = state_.ctm * m;
+    };
     if (word == "Identity") {
-      state_.ctm = {};
+      if (state_.still) state_.ctm = {};
     } else if (word == "Translate") {
       const auto n = numbers(3, "Translate");
       times(translation({n[0], n[1], n[2]}));
@@ -263,18 +130,19 @@ class Reader {
       Affine m;
       for (size_t r = 0; r < 3; ++r)
         for (size_t c = 0; c < 4; ++c) m.m[4 * r + c] = n[4 * c + r];
-      state_.ctm = word == "Transform" ? m : state_.ctm * m;
+      if (word == "Transform" && state_.still) state_.ctm = {};
+      times(m);
     } else if (word == "CoordinateSystem") {
       systems_[quoted("CoordinateSystem")] = state_.ctm;
     } else if (word == "CoordSysTransform") {
       const std::string name = quoted("CoordSysTransform");
       const auto found = systems_.find(name);
       if (found == systems_.end()) tokens_.fail(fmt::format("there is no coordinate system \"{}\"", shown(name)));
-      state_.ctm = found->second;
+      if (state_.still) state_.ctm = found->second;
     } else if (word == "ReverseOrientation") {
       state_.reversed = !state_.reversed;
     } else if (word == "AttributeBegin" || word == "TransformBegin") {
-      if (stack_.size() >= kDeepest * 16) tokens_.fail("attributes lie in each other without end");
+      if (stack_.size() >= kDeepest) tokens_.fail("attributes lie in each other without end");
       stack_.push_back(state_);
     } else if (word == "AttributeEnd" || word == "TransformEnd") {
       if (stack_.empty()) tokens_.fail(fmt::format("{} without its beginning", word));
@@ -285,8 +153,14 @@ class Reader {
         state_ = std::move(stack_.back());
       stack_.pop_back();
     } else if (word == "Attribute") {
-      quoted("Attribute"), parameters();
-      build_.leave_out("Attribute, which gives parameters to statements that follow");
+      const std::string target = quoted("Attribute");
+      static const std::set<std::string> kTargets = {"shape", "light", "material", "medium", "texture"};
+      if (kTargets.count(target) == 0) tokens_.fail(fmt::format("Attribute is for \"{}\"", shown(target)));
+      PbrtParameters& given = state_.given[target];
+      for (PbrtParameter& p : pbrt_parameters(tokens_).list) {
+        std::erase_if(given.list, [&](const PbrtParameter& old) { return old.name == p.name; });
+        given.list.push_back(std::move(p));
+      }
     } else if (word == "WorldBegin") {
       state_.ctm = {};
       systems_["world"] = state_.ctm;
@@ -309,19 +183,14 @@ class Reader {
     } else if (word == "ObjectInstance") {
       instance(quoted("ObjectInstance"));
     } else if (word == "ActiveTransform") {
-      if (tokens_.next()) build_.leave_out("ActiveTransform: motion");
+      const std::string which = tokens_.next().value_or(PbrtToken{}).text;
+      state_.still = which != "EndTime";
+      if (which != "All") build_.leave_out("motion");
     } else if (word == "TransformTimes") {
       numbers(2, "TransformTimes");
     } else if (word == "NamedMaterial") {
       const std::string name = quoted("NamedMaterial");
-      const auto found = materials_.find(name);
-      if (found == materials_.end()) {
-        build_.scene.warnings.add("unknown materials", build_.path(),
-                                  fmt::format("there is no material \"{}\"; grey stands in", shown(name)));
-        state_.material = 0, state_.nothing = false;
-      } else {
-        state_.material = found->second.first, state_.nothing = found->second.second;
-      }
+      std::tie(state_.material, state_.nothing) = named(name);
     } else {
       with_parameters(word);
     }
@@ -338,11 +207,13 @@ class Reader {
     const auto passed = kPassed.find(word);
     if (word == "Texture") {
       const std::string name = quoted("Texture"), type = quoted("Texture"), kind = quoted("Texture");
-      texture(name, kind, parameters());
+      const Parameters p = parameters("texture");
+      texture(name, type, kind, p);
+      tell_unread(fmt::format("textures of the kind {}", kind), p);
     } else if (word == "MediumInterface") {
-      quoted(word.c_str());
-      while (tokens_.peek() && tokens_.peek()->quoted) tokens_.next();
-      build_.leave_out("media");
+      bool any = !quoted(word.c_str()).empty();
+      while (tokens_.peek() && tokens_.peek()->quoted) any = !tokens_.next()->text.empty() || any;
+      if (any) build_.leave_out("media");
     } else if (passed != kPassed.end()) {
       const std::string kind = quoted(word.c_str());
       parameters();
@@ -351,7 +222,9 @@ class Reader {
         build_.approximate(fmt::format("the colour space {} is taken as sRGB's", kind));
     } else if (word == "Film") {
       quoted("Film");
-      film(parameters());
+      const Parameters p = parameters();
+      film(p);
+      tell_unread("Film", p);
     } else if (word == "Camera") {
       camera_kind_ = quoted("Camera");
       camera_ = parameters();
@@ -362,23 +235,28 @@ class Reader {
       has_camera_ = true;
     } else if (word == "Material") {
       const std::string kind = quoted("Material");
-      state_.material = material(kind, kind, parameters());
+      const Parameters p = parameters("material");
+      state_.material = material(kind, kind, p);
       state_.nothing = kind.empty() || kind == "interface" || kind == "none";
     } else if (word == "MakeNamedMaterial") {
       const std::string name = quoted("MakeNamedMaterial");
-      const Parameters p = parameters();
+      const Parameters p = parameters("material");
       const std::string kind = p.word("type", "diffuse");
       materials_[name] = {material(name, kind, p), kind.empty() || kind == "interface" || kind == "none"};
     } else if (word == "AreaLightSource") {
       const std::string kind = quoted("AreaLightSource");
-      state_.area_light = parameters();
+      state_.area_light = parameters("light");
       if (kind != "diffuse") build_.approximate(fmt::format("area lights of the kind {} are taken as diffuse", kind));
     } else if (word == "LightSource") {
       const std::string kind = quoted("LightSource");
-      light(kind, parameters());
+      const Parameters p = parameters("light");
+      light(kind, p);
+      tell_unread(fmt::format("lights of the kind {}", kind), p);
     } else if (word == "Shape") {
       const std::string kind = quoted("Shape");
-      shape(kind, parameters());
+      const Parameters p = parameters("shape");
+      shape(kind, p);
+      tell_unread(fmt::format("shapes of the kind {}", kind), p);
     } else {
       tokens_.fail(fmt::format("\"{}\" is no statement", shown(word)));
     }
@@ -399,7 +277,7 @@ class Reader {
     Affine m;
     for (size_t r = 0; r < 3; ++r)
       m.m[4 * r] = x[r], m.m[4 * r + 1] = y[r], m.m[4 * r + 2] = z[r], m.m[4 * r + 3] = eye[r];
-    state_.ctm = state_.ctm * *inverse(m);
+    if (state_.still) state_.ctm = state_.ctm * *inverse(m);
   }
 
   void instance(const std::string& name) {
@@ -408,7 +286,7 @@ class Reader {
     if (object_) tokens_.fail("ObjectInstance inside of an object");
     for (const Part& part : found->second) {
       if (++instances_ > kMostInstances) tokens_.fail("there are too many instances");
-      build_.add(part.name, *part.geometry, state_.ctm * part.place, part.material, part.flipped, part.key);
+      build_.add(part.name, *part.geometry, state_.ctm * part.place, part.material, part.flipped, part.key, part.mask);
     }
   }
 
@@ -420,6 +298,12 @@ class Reader {
       tokens_.fail(fmt::format("a film of {} by {} pixels", width, height));
     build_.scene.width = static_cast<uint32_t>(width), build_.scene.height = static_cast<uint32_t>(height);
     if (p.word("sensor", "cie1931") != "cie1931") build_.approximate("the film's sensor is taken as \"cie1931\"");
+    const double exposure = p.number("exposuretime", 1) * p.number("iso", 100) / 100;
+    if (!(exposure > 0 && exposure < 1e15)) tokens_.fail(fmt::format("a film that is exposed {} times", exposure));
+    build_.exposure = exposure;
+    if (p.number("whitebalance", 0) > 0) build_.leave_out("the film's white balance");
+    if (p.find("cropwindow") != nullptr || p.find("pixelbounds") != nullptr) build_.leave_out("the film's crop");
+    for (const char* name : {"filename", "savefp16", "diagonal", "maxcomponentvalue"}) p.ignore(name);
   }
   // When the film is known.
   void finish_camera() {
@@ -438,7 +322,7 @@ class Reader {
       window[0] = -aspect, window[1] = aspect;
     else
       window[2] = -1 / aspect, window[3] = 1 / aspect;
-    if (const Parameter* p = camera_.find("screenwindow"); p != nullptr && p->numbers.size() == 4)
+    if (const PbrtParameter* p = camera_.find("screenwindow"); p != nullptr && p->numbers.size() == 4)
       std::copy(p->numbers.begin(), p->numbers.end(), window);
     const double height = window[3] - window[2];
     if (!(height > 0 && window[1] > window[0])) build_.fail("Camera", "its screenwindow is empty");
@@ -456,27 +340,29 @@ class Reader {
     }
     const double lens = camera_.number("lensradius", 0), focus = camera_.number("focaldistance", 1e6);
     if (lens > 0 && focus > 0) c.lens_radius = static_cast<float>(lens), c.focus_distance = static_cast<float>(focus);
+    for (const char* name : {"shutteropen", "shutterclose"}) camera_.ignore(name);
+    tell_unread(fmt::format("Camera \"{}\"", camera_kind_), camera_);
   }
 
   // ---- Colours and textures
 
   enum class Use { reflectance, light, number };
 
-  std::vector<std::pair<double, double>> samples(const Parameter& p) {
-    std::vector<std::pair<double, double>> out;
+  Spectrum samples(const PbrtParameter& p) {
+    Spectrum out;
     std::vector<double> values = p.numbers;
     if (!p.words.empty()) {
       const FoundFile file = find_beside(build_.path(), p.words[0]);
       if (file.path.empty()) return out;
-      Tokens words(file.path);
-      while (const auto token = words.next()) values.push_back(number_of(*token, "a spectrum's file"));
+      PbrtTokens words(file.path);
+      while (const auto token = words.next()) values.push_back(pbrt_number(words, *token, "a spectrum's file"));
     }
     for (size_t i = 0; i + 1 < values.size(); i += 2) out.emplace_back(values[i], values[i + 1]);
     std::sort(out.begin(), out.end());
     return out;
   }
   // Light has luminance 1 but for "rgb", whose numbers are what they are.
-  Vec colour(const Parameter* p, const Vec& otherwise, Use use) {
+  Vec colour(const PbrtParameter* p, const Vec& otherwise, Use use) {
     if (p == nullptr) return otherwise;
     if (p->type == "rgb" || p->type == "color") {
       if (p->numbers.size() != 3)
@@ -493,7 +379,10 @@ class Reader {
     if (!p->words.empty()) {
       const std::string& name = p->words[0];
       if (name == "stdillum-A") return blackbody(2856);
-      if (name.starts_with("stdillum-")) return {1, 1, 1};
+      if (name.starts_with("stdillum-") || name.starts_with("illum-")) {
+        if (name != "stdillum-D65") build_.approximate(fmt::format("the light {} is white", name));
+        return {1, 1, 1};
+      }
       if (const auto glass = named_glass(name)) return {*glass, *glass, *glass};
     }
     const auto spectrum = samples(*p);
@@ -502,14 +391,12 @@ class Reader {
           fmt::format("the spectrum {} is not known; grey stands in", p->words.empty() ? "" : p->words[0]));
       return otherwise;
     }
-    Vec rgb = rgb_of_spectrum(spectrum);
     if (use == Use::light) {
+      const Vec rgb = rgb_of_spectrum(spectrum);
       const double luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
       return luminance > 0 ? rgb * (1 / luminance) : rgb;
     }
-    const Vec flat = rgb_of_spectrum({{300, 1}, {900, 1}});
-    for (size_t k = 0; k < 3; ++k) rgb[k] /= flat[k];
-    return rgb;
+    return rgb_of_reflectance(spectrum);
   }
   static std::optional<double> named_glass(const std::string& name) {
     static const std::map<std::string, double> kGlasses = {
@@ -520,12 +407,15 @@ class Reader {
     if (found == kGlasses.end()) return std::nullopt;
     return found->second;
   }
-  PaintRef paint(const Parameters& p, const char* name, double otherwise) {
-    const Parameter* given = p.find(name);
+  // Of numbers and of colours there may be textures of one name.
+  PaintRef paint(const Parameters& p, const char* name, double otherwise, bool of_numbers = false) {
+    const PbrtParameter* given = p.find(name);
     if (given == nullptr) return constant_paint(otherwise);
     if (given->type == "texture") {
-      const auto found = given->words.empty() ? textures_.end() : textures_.find(given->words[0]);
-      if (found != textures_.end()) return found->second;
+      for (const bool numbers : {of_numbers, !of_numbers}) {
+        const auto found = given->words.empty() ? textures_.end() : textures_.find({given->words[0], numbers});
+        if (found != textures_.end()) return found->second;
+      }
       build_.scene.warnings.add("unknown textures", build_.path(),
                                 fmt::format("there is no texture \"{}\"; {} stands in",
                                             given->words.empty() ? "" : shown(given->words[0]), otherwise));
@@ -534,41 +424,54 @@ class Reader {
     return constant_paint(colour(given, {otherwise, otherwise, otherwise}, Use::reflectance));
   }
 
-  void texture(const std::string& name, const std::string& kind, const Parameters& p) {
+  void texture(const std::string& name, const std::string& type, const std::string& kind, const Parameters& p) {
+    const bool numbers = type == "float";
+    const auto part = [&](const char* key, double otherwise) { return paint(p, key, otherwise, numbers); };
     Paint out;
-    out.uv[0] = p.number("uscale", 1), out.uv[1] = p.number("vscale", 1);
-    out.uv[2] = p.number("udelta", 0), out.uv[3] = p.number("vdelta", 0);
-    if (p.word("mapping", "uv") != "uv")
-      build_.approximate(fmt::format("textures mapped {} are taken as by uv", p.word("mapping", "uv")));
     PaintRef result;
     if (kind == "constant") {
-      result = paint(p, "value", 1);
+      result = part("value", 1);
     } else if (kind == "scale") {
-      out.kind = Paint::Kind::product, out.a = paint(p, "tex", 1), out.b = paint(p, "scale", 1);
-      result = build_.made(out);
+      result = build_.product(part("tex", 1), paint(p, "scale", 1, true));
     } else if (kind == "mix") {
-      out.kind = Paint::Kind::mix, out.a = paint(p, "tex1", 0), out.b = paint(p, "tex2", 1),
-      out.share = paint(p, "amount", 0.5);
-      result = build_.made(out);
-    } else if (kind == "checkerboard" && p.number("dimension", 2) == 2) {
-      out.kind = Paint::Kind::checker, out.a = paint(p, "tex1", 1), out.b = paint(p, "tex2", 0);
+      result = build_.mixed(part("tex1", 0), part("tex2", 1), paint(p, "amount", 0.5, true));
+    } else if (kind == "directionmix") {
+      build_.approximate(fmt::format("the texture \"{}\", a mix by direction, is a mix in equal parts", name));
+      p.ignore("dir");
+      result = build_.mixed(part("tex1", 0), part("tex2", 1), constant_paint(0.5));
+    } else if (kind == "bilerp") {
+      const auto axis = [&](uint32_t which) {
+        Paint coordinate;
+        coordinate.kind = Paint::Kind::axis, coordinate.mode = which, coordinate.place = place_of(p, kind);
+        return build_.made(coordinate);
+      };
+      const PaintRef t = axis(1);
+      result = build_.mixed(build_.mixed(part("v00", 0), part("v01", 1), t),
+                            build_.mixed(part("v10", 0), part("v11", 1), t), axis(0));
+    } else if (kind == "checkerboard") {
+      out.kind = Paint::Kind::checker, out.a = part("tex1", 1), out.b = part("tex2", 0);
+      out.place = p.number("dimension", 2) == 3 ? TexturePlace{inverse_place(), true} : place_of(p, kind);
       result = build_.made(out);
     } else if (kind == "imagemap") {
       const std::string encoding = p.word("encoding", "sRGB"), wrap = p.word("wrap", "repeat");
       if (encoding != "sRGB" && encoding != "linear")
         build_.approximate(fmt::format("textures of the encoding \"{}\" are taken as sRGB", encoding));
       uint32_t flags = wrap == "clamp" ? uint32_t{LUMICUT_CLAMP} : 0u;
-      if (wrap != "clamp" && wrap != "repeat") build_.approximate(fmt::format("textures wrapped \"{}\" repeat", wrap));
+      if (wrap == "black") out.mode = 1;
+      if (wrap == "octahedralsphere") build_.approximate("textures wrapped \"octahedralsphere\" repeat");
       if (p.word("filter", "bilinear") == "point") flags |= LUMICUT_NEAREST;
-      out.kind = Paint::Kind::image;
+      p.ignore("maxanisotropy");
+      out.kind = Paint::Kind::image, out.place = place_of(p, kind);
       out.texture =
           build_.image(p.word("filename", ""), encoding == "linear" ? TextureUse::numbers : TextureUse::colour, flags);
+      const double scale = p.number("scale", 1);
+      const bool invert = p.truth("invert", false);
       if (out.texture == 0) {
         result = constant_paint(0.5);
       } else {
         result = build_.made(out);
-        if (const double scale = p.number("scale", 1); scale != 1) result = product(result, constant_paint(scale));
-        if (p.truth("invert", false)) {
+        if (scale != 1) result = build_.product(result, constant_paint(scale));
+        if (invert) {
           Paint inverted;
           inverted.kind = Paint::Kind::invert, inverted.a = result;
           result = build_.made(inverted);
@@ -577,23 +480,47 @@ class Reader {
     } else {
       build_.approximate(fmt::format("the texture \"{}\" of the kind {} is grey", name, kind));
       result = constant_paint(0.5);
+      for (const PbrtParameter& q : p.list) p.ignore(q.name);
     }
-    textures_[name] = result;
+    textures_[{name, numbers}] = result;
   }
-  PaintRef product(const PaintRef& a, const PaintRef& b) const {
-    Paint out;
-    out.kind = Paint::Kind::product, out.a = a, out.b = b;
-    return build_.made(out);
+  Affine inverse_place() const {
+    const auto back = inverse(state_.ctm);
+    if (!back) tokens_.fail("the texture's transform flattens space");
+    return *back;
+  }
+  TexturePlace place_of(const Parameters& p, const std::string& kind) {
+    TexturePlace out;
+    const std::string mapping = p.word("mapping", "uv");
+    const double du = p.number("udelta", 0), dv = p.number("vdelta", 0);
+    if (mapping == "planar") {
+      const Affine back = inverse_place();
+      const Vec axes[2] = {p.vector("v1", {1, 0, 0}), p.vector("v2", {0, 1, 0})};
+      out.of_point = true;
+      for (size_t r = 0; r < 2; ++r) {
+        for (size_t c = 0; c < 3; ++c) out.to.m[4 * r + c] = dot(axes[r], back.column(c));
+        out.to.m[4 * r + 3] = dot(axes[r], back.column(3)) + (r == 0 ? du : dv);
+      }
+      out.to.m[8] = out.to.m[9] = out.to.m[10] = out.to.m[11] = 0;
+      return out;
+    }
+    if (mapping != "uv") build_.approximate(fmt::format("{}s mapped \"{}\" are taken as by uv", kind, mapping));
+    out.to.m[0] = p.number("uscale", 1), out.to.m[5] = p.number("vscale", 1);
+    out.to.m[3] = du, out.to.m[7] = dv;
+    return out;
   }
 
   // ---- Materials
 
   // The library's roughness is the root of GGX's alpha, which is the root of pbrt's roughness where that is remapped.
   void set_roughness(const Parameters& p, const std::string& prefix, lumicut_material& m) {
-    PaintRef rough = paint(p, (prefix + "roughness").c_str(), 0);
-    if (p.find(prefix + "uroughness") != nullptr || p.find(prefix + "vroughness") != nullptr) {
-      rough = paint(p, (prefix + (p.find(prefix + "uroughness") != nullptr ? "uroughness" : "vroughness")).c_str(), 0);
-      build_.approximate("roughness that differs along u and v is taken as that along u");
+    PaintRef rough = paint(p, (prefix + "roughness").c_str(), 0, true);
+    const bool u = p.find(prefix + "uroughness") != nullptr, v = p.find(prefix + "vroughness") != nullptr;
+    if (u || v) {
+      const PaintRef along_v = paint(p, (prefix + (v ? "vroughness" : "uroughness")).c_str(), 0, true);
+      rough = paint(p, (prefix + (u ? "uroughness" : "vroughness")).c_str(), 0, true);
+      if (rough != along_v && (!constant_of(rough) || constant_of(rough) != constant_of(along_v)))
+        build_.approximate("roughness that differs along u and v is taken as that along u");
     }
     build_.set_number(power_paint(rough, p.truth("remaproughness", true) ? 0.25 : 0.5), m.roughness,
                       m.roughness_texture);
@@ -602,15 +529,16 @@ class Reader {
     const Vec eta = colour(p.find(name), {otherwise, otherwise, otherwise}, Use::number);
     return std::clamp(eta[1], 0.1, 10.0);
   }
-  void set_metal(const Parameters& p, const std::string& prefix, lumicut_material& m) {
+  // `outside`: index of what it lies in.
+  void set_metal(const Parameters& p, const std::string& prefix, double outside, lumicut_material& m) {
     m.metallic = 1;
     if (p.find("reflectance") != nullptr) {
       build_.set_colour(paint(p, "reflectance", 0.5), m.diffuse, m.diffuse_texture);
       return;
     }
-    const Parameter *eta = p.find(prefix + "eta"), *k = p.find(prefix + "k");
+    const PbrtParameter *eta = p.find(prefix + "eta"), *k = p.find(prefix + "k");
     std::pair<Vec, Vec> both = *named_metal("Cu");
-    const auto one = [&](const Parameter* given, Vec& out, bool absorbing) {
+    const auto one = [&](const PbrtParameter* given, Vec& out, bool absorbing) {
       if (given == nullptr) return;
       if (given->type == "spectrum" && !given->words.empty() && given->words[0].starts_with("metal-")) {
         const std::string name = given->words[0].substr(6, given->words[0].rfind('-') - 6);
@@ -622,7 +550,7 @@ class Reader {
       out = colour(given, out, Use::number);
     };
     one(eta, both.first, false), one(k, both.second, true);
-    const Metal metal = metal_of(both.first, both.second);
+    const Metal metal = metal_of(both.first * (1 / outside), both.second * (1 / outside));
     store(m.diffuse, metal.colour), store(m.specular_tint, metal.tint);
   }
 
@@ -642,13 +570,13 @@ class Reader {
       set_roughness(p, "", m);
     } else if (kind == "conductor") {
       ggx();
-      set_metal(p, "", m);
+      set_metal(p, "", 1, m);
       set_roughness(p, "", m);
     } else if (kind == "coatedconductor") {
       ggx();
-      set_metal(p, "conductor.", m);
-      set_roughness(p, "conductor.", m);
       m.coat = 1, m.coat_ior = static_cast<float>(std::max(1.0, index(p, "interface.eta", 1.5)));
+      set_metal(p, "conductor.", m.coat_ior, m);
+      set_roughness(p, "conductor.", m);
       lumicut_material coat{};
       set_roughness(p, "interface.", coat);
       m.coat_roughness = coat.roughness;
@@ -670,23 +598,45 @@ class Reader {
           if (m.translucency_texture == 0) m.translucency[k] = std::min(m.translucency[k], 1.0f);
         }
     } else if (kind == "mix") {
-      const Parameter* both = p.find("materials");
-      if (both != nullptr && both->words.size() == 2) {
-        const bool second = constant_of(paint(p, "amount", 0.5)).value_or(Vec{0.5, 0.5, 0.5})[0] > 0.5;
-        build_.approximate(fmt::format("the material \"{}\", a mix, is the one that it has more of", name));
-        const auto found = materials_.find(both->words[second ? 1 : 0]);
-        if (found != materials_.end()) return found->second.first;
-      }
-    } else if (!(kind.empty() || kind == "interface" || kind == "none")) {
+      const PbrtParameter* both = p.find("materials");
+      if (both == nullptr || both->words.size() != 2)
+        tokens_.fail(
+            fmt::format("the material \"{}\", a mix, names {} materials", shown(name), both ? both->words.size() : 0));
+      const PaintRef amount = paint(p, "amount", 0.5, true);
+      const uint32_t first = named(both->words[0]).first, second = named(both->words[1]).first;
+      finish_material(kind, p);
+      return build_.mix_materials(name, first, second, amount);
+    } else if (kind.empty() || kind == "interface" || kind == "none") {
+      m.opacity = kHole;  // in mixes; shapes of it alone are not there
+    } else {
       build_.approximate(fmt::format("the material \"{}\" of the kind {} is diffuse", name, kind));
       build_.set_colour(paint(p, "reflectance", 0.5), m.diffuse, m.diffuse_texture);
+      for (const PbrtParameter& q : p.list) p.ignore(q.name);
     }
     if (const std::string map = p.word("normalmap", ""); !map.empty()) {
       m.normal_texture = build_.image(map, TextureUse::vectors, 0);
       if (m.normal_texture != 0) m.normal_strength = 1;
+      if (p.find("displacement") != nullptr) build_.leave_out("displacement beside a normal map");
+    } else {
+      build_.set_bump(paint(p, "displacement", 0, true), 1, m);
     }
-    if (p.find("displacement") != nullptr) build_.leave_out("displacement");
+    finish_material(kind, p);
     return build_.add_material(name, m);
+  }
+  void finish_material(const std::string& kind, const Parameters& p) {
+    p.ignore("type"), p.ignore("maxdepth"), p.ignore("nsamples");
+    const auto is_albedo = [](const PbrtParameter& q) { return q.name == "albedo"; };
+    if (std::none_of(p.list.begin(), p.list.end(), is_albedo))
+      p.ignore("thickness"), p.ignore("g");  // nothing is in the coat
+    tell_unread(fmt::format("materials of the kind {}", kind), p);
+  }
+  // The material of that name, and whether it is nothing.
+  std::pair<uint32_t, bool> named(const std::string& name) {
+    const auto found = materials_.find(name);
+    if (found != materials_.end()) return found->second;
+    build_.scene.warnings.add("unknown materials", build_.path(),
+                              fmt::format("there is no material \"{}\"; grey stands in", shown(name)));
+    return {0, false};
   }
 
   // ---- Lights
@@ -727,6 +677,7 @@ class Reader {
       infinite(p, scale, name);
     } else {
       build_.leave_out(fmt::format("lights of the kind {}", kind));
+      for (const PbrtParameter& q : p.list) p.ignore(q.name);
     }
   }
   void set_value(lumicut_light& l, const Vec& rgb, double scale, const std::string& name) {
@@ -750,10 +701,11 @@ class Reader {
       rgb = colour(p.find("L"), {1, 1, 1}, Use::light);
       if (lux > 0) scale *= lux / kPi;
     } else {
-      if (lux > 0) build_.leave_out("the illuminance of infinite lights with a picture");
       const int32_t square = build_.image(file, TextureUse::radiance, 0);
       if (square != 0) e.texture = unrolled(square);
+      if (const double now = e.texture != 0 ? illuminance_of(e.texture) : 0; lux > 0 && now > 0) scale *= lux / now;
     }
+    if (p.find("portal") != nullptr) build_.approximate("infinite lights shine from all around, whatever their portal");
     if (!(scale >= 0 && scale < 1e15)) tokens_.fail(fmt::format("{} has a scale of {}", name, scale));
     for (size_t k = 0; k < 3; ++k) e.color[k] = static_cast<float>(std::clamp(rgb[k], 0.0, 1e15) * scale);
     // Axes of the light in the world, z up; what mirrors is taken into the map.
@@ -764,6 +716,20 @@ class Reader {
     for (size_t r = 0; r < 3; ++r)
       for (size_t c = 0; c < 3; ++c) e.world_to_map[3 * r + c] = static_cast<float>(rows[r][c]);
     build_.scene.environment = e;
+  }
+  // Of a plane that faces the map's z.
+  double illuminance_of(int32_t number) const {
+    const Texture& t = build_.scene.textures.at(static_cast<size_t>(number) - 1);
+    double sum = 0;
+    for (size_t row = 0; row < t.height / 2; ++row) {
+      const double latitude = kPi * (0.5 - (double(row) + 0.5) / t.height);
+      const double weight = std::sin(latitude) * std::cos(latitude) * kPi / t.height * 2 * kPi / t.width;
+      for (size_t c = 0; c < t.width; ++c) {
+        const float* x = &t.floats[(row * t.width + c) * t.channels];
+        sum += weight * (t.channels == 3 ? 0.2126 * x[0] + 0.7152 * x[1] + 0.0722 * x[2] : x[0]);
+      }
+    }
+    return sum;
   }
   // y and -y change places: in the map, the columns about x.
   void mirror(int32_t number) {
@@ -826,45 +792,71 @@ class Reader {
     std::vector<Geometry> several;
     const double radius = p.number("radius", 1), sweep = radians(std::clamp(p.number("phimax", 360), 0.1, 360.0));
     if (kind == "sphere") {
-      if (p.find("zmin") != nullptr || p.find("zmax") != nullptr || p.find("phimax") != nullptr)
-        build_.approximate("parts of spheres are whole");
-      g = sphere(), key = "sphere";
+      const double z0 = radius != 0 ? p.number("zmin", -radius) / radius : -1,
+                   z1 = radius != 0 ? p.number("zmax", radius) / radius : 1;
+      if (z0 <= -1 && z1 >= 1 && sweep > 2 * kPi - 1e-6)
+        g = sphere(), key = "sphere";
+      else
+        g = sphere_part_geometry(std::min(z0, z1), std::max(z0, z1), sweep);
       place = place * scaling({radius, radius, radius});
     } else if (kind == "disk") {
       g = disk_geometry(p.number("height", 0), radius, p.number("innerradius", 0), sweep);
     } else if (kind == "cylinder") {
       g = cylinder_geometry(radius, p.number("zmin", -1), p.number("zmax", 1), sweep);
     } else if (kind == "trianglemesh" || kind == "loopsubdiv" || kind == "bilinearmesh") {
-      if (kind == "loopsubdiv") build_.approximate("subdivision surfaces are their control meshes");
       g = mesh(p, kind == "bilinearmesh" ? 4 : 3, name);
+      if (kind == "loopsubdiv") subdivide(p, g, name);
+      for (const char* unused : {"S", "faceIndices", "scheme"}) p.ignore(unused);
     } else if (kind == "plymesh") {
       several = build_.read_meshes(p.word("filename", ""));
       for (Geometry& one : several) follow_normals(one);
       if (p.find("displacement") != nullptr) build_.leave_out("displacement");
+      p.ignore("edgelength");
     } else {
       build_.leave_out(fmt::format("shapes of the kind {}", kind));
+      for (const PbrtParameter& q : p.list) p.ignore(q.name);
       return;
     }
-    uint32_t used = state_.material;
+    uint32_t used = state_.material, mask = 0;
+    const bool no_alpha = constant_of(paint(p, "alpha", 1, true)).value_or(Vec{1, 1, 1})[0] <= 0;
     if (state_.nothing && !state_.area_light) return build_.leave_out("borders of media");
-    if (p.find("alpha") != nullptr) used = with_alpha(used, p);
+    if (no_alpha && !state_.area_light) return;
+    if (no_alpha) mask = LUMICUT_DIFFUSE_RAYS;  // it lights the scene, and nothing sees it
+    if (no_alpha || state_.nothing)
+      used = black();
+    else
+      used = with_alpha(used, p);
     if (several.empty()) several.push_back(std::move(g));
     // Normals of meshes follow their transform; those of the others are the product of two tangents that do.
     const bool turned = (kind == "sphere" || kind == "disk" || kind == "cylinder") && place.determinant() < 0;
-    for (Geometry& one : several) put(name, std::move(one), place, used, state_.reversed != turned, key);
+    for (Geometry& one : several) put(name, std::move(one), place, used, state_.reversed != turned, key, mask);
   }
   void put(const std::string& name, Geometry&& g, const Affine& place, uint32_t material, bool flipped,
-           const std::string& key) {
+           const std::string& key, uint32_t mask) {
     if (state_.area_light) {
       if (object_)
         build_.leave_out("area lights inside of objects");
       else
         material = emitting(*state_.area_light, g, place, material);
     }
-    if (!object_) return build_.add(name, g, place, material, flipped, key);
+    if (!object_) return build_.add(name, g, place, material, flipped, key, mask);
     auto& parts = objects_[*object_];
     const std::string own = fmt::format("object \"{}\" {}", *object_, parts.size());
-    parts.push_back({name, own, std::make_shared<Geometry>(std::move(g)), place, material, flipped});
+    parts.push_back({name, own, std::make_shared<Geometry>(std::move(g)), place, material, flipped, mask});
+  }
+  void subdivide(const Parameters& p, Geometry& g, const std::string& name) {
+    const double levels = p.number("levels", 3);
+    if (!(levels >= 0 && levels <= 10 && double(g.indices.size() / 3) * std::pow(4, levels) <= 1e7))
+      tokens_.fail(fmt::format("{} has {} triangles and {} levels", name, g.indices.size() / 3, levels));
+    g = loop_subdivided(g, static_cast<int>(levels));
+  }
+  uint32_t black() {
+    if (!black_) {
+      lumicut_material m = default_material();
+      std::fill_n(m.diffuse, 3, 0.0f);
+      black_ = build_.add_material("what emits alone", m);
+    }
+    return *black_;
   }
   const Geometry& sphere() {
     if (!sphere_) sphere_ = sphere_geometry();
@@ -874,7 +866,7 @@ class Reader {
   Geometry mesh(const Parameters& p, size_t corners, const std::string& name) {
     Geometry g;
     const auto list = [&](const char* key) {
-      const Parameter* found = p.find(key);
+      const PbrtParameter* found = p.find(key);
       return found == nullptr ? std::vector<double>{} : found->numbers;
     };
     const auto add = [&](std::vector<float>& to, const std::vector<double>& values) {
@@ -912,9 +904,13 @@ class Reader {
         g.normals.clear();
       }
     follow_normals(g);
-    if (g.uvs.empty() && (corners == 4 || build_.scene.materials[state_.material].values.diffuse_texture != 0))
-      add_uvs(g, corners);
+    if (g.uvs.empty() && (corners == 4 || is_textured(state_.material) || state_.area_light)) add_uvs(g, corners);
     return g;
+  }
+  bool is_textured(uint32_t material) const {
+    const lumicut_material& m = build_.scene.materials[material].values;
+    return std::max({m.diffuse_texture, m.specular_texture, m.translucency_texture, m.roughness_texture,
+                     m.opacity_texture, m.normal_texture, m.height_texture}) > 0;
   }
   // Those of meshes that have none: each triangle's or patch's own.
   static void add_uvs(Geometry& g, size_t corners) {
@@ -946,7 +942,7 @@ class Reader {
 
   uint32_t with_alpha(uint32_t material, const Parameters& p) {
     lumicut_material m = build_.scene.materials[material].values;
-    const PaintRef alpha = paint(p, "alpha", 1);
+    const PaintRef alpha = paint(p, "alpha", 1, true);
     if (const auto value = constant_of(alpha)) {
       if ((*value)[0] >= 1) return material;
       m.opacity = std::max(kHole, static_cast<float>((*value)[0]));
@@ -959,7 +955,11 @@ class Reader {
     Vec radiance = colour(p.find("L"), {1, 1, 1}, Use::light);
     double scale = p.number("scale", 1);
     const bool both = p.truth("twosided", false);
-    if (!p.word("filename", "").empty()) build_.leave_out("pictures of area lights");
+    int32_t picture = 0;
+    if (const std::string file = p.word("filename", ""); !file.empty()) {
+      picture = build_.image(file, TextureUse::colour, 0);
+      radiance = {1, 1, 1};
+    }
     if (const double power = p.number("power", -1); power > 0) {
       double area = 0;
       for (size_t i = 0; i + 2 < g.indices.size(); i += 3) {
@@ -974,19 +974,21 @@ class Reader {
       if (area > 0) scale *= power / (area * kPi * (both ? 2 : 1));
     }
     if (!(scale >= 0 && scale < 1e15)) tokens_.fail(fmt::format("an area light has a scale of {}", scale));
-    return build_.with_emission(material, radiance * scale, 0, both);
+    tell_unread("area lights", p);
+    return build_.with_emission(material, radiance * scale, picture, both);
   }
 
-  Tokens tokens_;
+  PbrtTokens tokens_;
   SceneBuilder build_;
   State state_;
   std::vector<State> stack_;
   std::map<std::string, Affine> systems_;
-  std::map<std::string, PaintRef> textures_;
+  std::map<std::pair<std::string, bool>, PaintRef> textures_;   // by name, and whether of numbers
   std::map<std::string, std::pair<uint32_t, bool>> materials_;  // and whether it is the border of a medium
   std::map<std::string, std::vector<Part>> objects_;
   std::optional<std::string> object_;
   std::optional<Geometry> sphere_;
+  std::optional<uint32_t> black_;
   std::string camera_kind_;
   Parameters camera_;
   Affine camera_place_;

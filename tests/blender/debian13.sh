@@ -14,7 +14,7 @@ suites=("$@")
 command -v debootstrap >/dev/null || { echo "debian13: install debootstrap first" >&2; exit 1; }
 packages=(blender libembree-dev libtbb-dev libhwy-dev cmake ninja-build g++ python3 python3-numpy pkg-config
           nlohmann-json3-dev libboost-dev libfmt-dev libcli11-dev libopenexr-dev libimath-dev libopenimageio-dev openimageio-tools
-          python3-openimageio libtinyobjloader-dev libtinygltf-dev)
+          python3-openimageio libtinyobjloader-dev libtinygltf-dev libassimp-dev libpugixml-dev zlib1g-dev)
 [ -z "${ZIP-}" ] || packages=(blender python3 python3-numpy)
 
 if [ ! -x "$tree/usr/bin/dpkg" ]; then

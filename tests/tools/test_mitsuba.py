@@ -2,7 +2,9 @@
 import json
 import math
 import os
+import struct
 import unittest
+import zlib
 
 import numpy as np
 
@@ -158,11 +160,117 @@ class Mitsuba(SceneFiles):
                     material.update({"name": name} | keys)
                 self.assert_same(self.render(path, "--vpls", 100)[0], self.render(self.write("again.json", again), "--vpls", 100)[0])
 
+    def test_black_bodies_have_the_radiance_of_planck(self):
+        # 2 h c² / wavelength^5 / (exp(h c / (wavelength k T)) - 1) under the curve of Y, a nanometre, over the curve's area.
+        light = ('<emitter type="point"><point name="position" value="0, 2, 0"/><spectrum type="blackbody" name="intensity">'
+                 '<float name="temperature" value="{}"/><float name="scale" value=".001"/></spectrum></emitter>')
+        for kelvin in (3000, 5000):
+            nm = np.arange(380, 780.0)
+            y = (0.821 * np.exp(-0.5 * ((nm - 568.8) * np.where(nm < 568.8, 0.0213, 0.0247)) ** 2) +
+                 0.286 * np.exp(-0.5 * ((nm - 530.9) * np.where(nm < 530.9, 0.0613, 0.0322)) ** 2))
+            h, c, k = 6.62607015e-34, 2.99792458e8, 1.380649e-23
+            planck = 1e-9 * 2 * h * c * c / (nm * 1e-9) ** 5 / np.expm1(h * c / (nm * 1e-9 * k * kelvin))
+            luminance = self.lamp(self.floor(light.format(kelvin))) @ (0.2126, 0.7152, 0.0722)
+            np.testing.assert_allclose(luminance, 0.5 / math.pi / 4 * 0.001 * (planck * y).sum() / y.sum(), rtol=0.01)
+
+    def test_spectra_are_read_however_they_are_written(self):
+        (self.folder / "red.spd").write_text("# nm, value\n400 .1\n600 .1\n\n650 .8\n700 .8\n")
+        found = []
+        for text in ('<spectrum name="reflectance" value="400:.1, 600:.1, 650:.8, 700:.8"/>', '<spectrum name="reflectance" filename="red.spd"/>',
+                     '<spectrum name="reflectance" type="irregular"><string name="wavelengths" value="400, 600, 650, 700"/><string name="values" value=".1, .1, .8, .8"/></spectrum>',
+                     '<spectrum name="reflectance" type="regular"><float name="wavelength_min" value="400"/><float name="wavelength_max" value="700"/>'
+                     '<string name="values" value=".1, .1, .1, .1, .1, .8, .8"/></spectrum>'):
+            found.append(self.albedo(f'<bsdf type="diffuse">{text}</bsdf>')[0][1, 1])
+        self.assertGreater(found[0][0], 2 * found[0][2])
+        for other in found[1:]:
+            np.testing.assert_allclose(other, found[0], rtol=1e-4)
+        even = self.albedo('<bsdf type="diffuse"><spectrum name="reflectance" value="300:.3, 900:.3"/></bsdf>')[0][1, 1]
+        np.testing.assert_allclose(even, 0.3, rtol=1e-4)
+
+    def albedo(self, bsdf, back=False, *more, layers="albedo"):
+        """A square of 2 by 2 that fills the picture, seen from the front or from behind."""
+        path = self.write("square.xml", scene(
+            camera((0, 0, -3 if back else 3), (0, 0, 0), more="").replace('"perspective"', '"orthographic"').replace("48", "4").replace("36", "4").replace('<float name="fov" value="40"/>', ""),
+            '<emitter type="directional"><vector name="direction" value="0, 0, -1"/></emitter>', f'<shape type="rectangle">{bsdf}</shape>', *more))
+        return self.render(path, "--vpls", 10, layers=layers)
+
+    def test_textures_turn_and_are_mirrored(self):
+        (self.folder / "four.png").write_bytes(test_gltf.png(2, 2, [(255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 255)]))
+        image = ('<bsdf type="diffuse"><texture name="reflectance" type="bitmap"><string name="filename" value="four.png"/>'
+                 '<string name="filter_type" value="nearest"/>{}</texture></bsdf>').format
+        plain = self.albedo(image(""))[0]
+        turned = self.albedo(image('<transform name="to_uv"><translate x="-.5" y="-.5"/><rotate z="1" angle="90"/><translate x=".5" y=".5"/></transform>'))[0]
+        # (u, v) looks up (1 - v, u): what was below on the right is now on the left.
+        for (y, x), there in (((3, 0), (3, 3)), ((0, 0), (3, 0)), ((0, 3), (0, 0)), ((3, 3), (0, 3))):
+            np.testing.assert_allclose(turned[y, x], plain[there], atol=1e-4)
+        twice = '<transform name="to_uv"><scale value="2"/></transform>'
+        mirrored = self.albedo(image(twice + '<string name="wrap_mode" value="mirror"/>'))[0]
+        np.testing.assert_allclose(mirrored, mirrored[:, ::-1], atol=1e-4)
+        np.testing.assert_allclose(mirrored, mirrored[::-1], atol=1e-4)
+        self.assertGreater(np.abs(self.albedo(image(twice))[0] - mirrored).max(), 0.5)
+
+    def test_blends_and_two_sides_have_both_of_their_bsdfs(self):
+        one, two = ('<bsdf type="diffuse">' + rgb("reflectance", *c) + "</bsdf>" for c in ((0.8, 0.4, 0), (0, 0.4, 0.8)))
+        a, b = np.array([0.8, 0.4, 0]), np.array([0, 0.4, 0.8])
+        found, said = self.albedo(f'<bsdf type="blendbsdf"><float name="weight" value=".25"/>{one}{two}</bsdf>')
+        np.testing.assert_allclose(found[1, 1], 0.75 * a + 0.25 * b, rtol=1e-5)
+        self.assertNotIn("warning", said)
+        for back, wanted in ((False, a), (True, b)):
+            found, said = self.albedo(f'<bsdf type="twosided">{one}{two}</bsdf>', back)
+            np.testing.assert_allclose(found[1, 1], wanted, atol=1e-5)
+            self.assertNotIn("warning", said)
+
+    def test_serialized_meshes_are_read_by_their_number(self):
+        square = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]
+
+        def packed(vertices, kind, flag, name):
+            numbers = b"".join(struct.pack(f"<3{kind}", *v) for v in vertices)
+            numbers += b"".join(struct.pack(f"<3{kind}", 0, 0, 1) for _ in vertices) + b"".join(struct.pack(f"<2{kind}", (x + 1) / 2, (y + 1) / 2) for x, y, _ in vertices)
+            body = struct.pack("<I", flag | 3) + name + b"\0" + struct.pack("<QQ", len(vertices), 2) + numbers + struct.pack("<6I", 0, 1, 2, 0, 2, 3)
+            return struct.pack("<HH", 0x041C, 4) + zlib.compress(body)
+        first, second = packed([(2 * x, y, z) for x, y, z in square], "f", 0x1000, b"wide"), packed(square, "d", 0x2000, b"square")
+        whole = first + second + struct.pack("<QQI", 0, len(first), 2)
+        (self.folder / "two.serialized").write_bytes(whole)
+        shape = '<shape type="serialized"><string name="filename" value="two.serialized"/><integer name="shape_index" value="{}"/><bsdf type="diffuse"/></shape>'.format
+        for index, width in ((0, 4), (1, 2)):
+            self.assert_ends(lumicut("convert", self.write("mesh.xml", scene(shape(index))), self.folder / "mesh.json"), OK)
+            places = json.loads((self.folder / "mesh.json").read_text())["meshes"][0]["positions"]
+            if isinstance(places, dict):
+                places = np.fromfile(self.folder / places["file"], np.float32, 12, offset=places.get("offset", 0)).reshape(4, 3)
+            self.assertEqual(np.ptp(np.array(places)[:, 0]), width)
+        for broken, text in ((whole[:-1], "meshes"), (whole[:len(first) + 40] + whole[-20:], "two.serialized"), (b"abcd", "version"), (b"", "ends"), (whole, "number 7")):
+            (self.folder / "two.serialized").write_bytes(broken)
+            self.assert_ends(lumicut("render", self.write("mesh.xml", scene(shape(7 if broken is whole else 1))), "-o", self.folder / "x.exr"), BAD_FILE, text)
+
+    def test_scenes_of_before_version_2_are_read_as_they_are_now(self):
+        now = scene(camera((0, 3, 5), (0, 0, 0)), '<emitter type="constant"/>',
+                    '<shape type="rectangle">' + placed('<rotate x="1" angle="-90"/>') + '<bsdf type="roughplastic"><texture name="diffuse_reflectance" type="checkerboard">'
+                    '<rgb name="color0" value=".7"/><rgb name="color1" value=".1"/><transform name="to_uv"><scale x="3" y="2"/><translate x="0.25" y="0"/></transform></texture>'
+                    '<float name="int_ior" value="1.3"/><float name="alpha" value=".2"/></bsdf></shape>')
+        before = now.replace("3.0.0", "0.5.0").replace("to_world", "toWorld").replace("lookat", "lookAt").replace("diffuse_reflectance", "diffuseReflectance").replace("int_ior", "intIOR").replace(
+            '<transform name="to_uv"><scale x="3" y="2"/><translate x="0.25" y="0"/></transform>',
+            '<float name="uscale" value="3"/><float name="vscale" value="2"/><float name="uoffset" value="0.25"/>')
+        wanted, _ = self.render(self.write("now.xml", now), "--vpls", 200)
+        found, said = self.render(self.write("before.xml", before), "--vpls", 200)
+        np.testing.assert_array_equal(found, wanted)
+        self.assertNotIn("left out", said)
+
+    def test_hidden_emitters_light_and_are_not_seen(self):
+        lamp = ('<shape type="disk">' + placed('<scale value=".5"/>', '<rotate x="1" angle="90"/>', '<translate y="1"/>') +
+                '<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf><emitter type="area"><rgb name="radiance" value="2"/></emitter></shape>')
+        path = self.write("hidden.xml", scene('<integrator type="aov"><integrator type="path"><boolean name="hide_emitters" value="true"/></integrator></integrator>',
+                                              camera((0, 4, 0.001), (0, 0, 0), 60, (9, 9)), FLOOR, lamp, '<emitter type="constant"><rgb name="radiance" value=".001"/></emitter>'))
+        found = self.render(path, "--vpls", 2000, "-p", "clamp_lights=0")[0]
+        np.testing.assert_allclose(found[4, 4], 0.5 * 2 * 0.25 / 1.25, rtol=0.03)  # through the lamp, on the floor
+        self.assertEqual(found[0, 0].max(), 0)  # beside the floor
+
     def test_what_is_not_supported_is_named(self):
         path = self.floor('<emitter type="projector"/>', '<medium type="homogeneous"/>', '<emitter type="point"/>',
-                          '<shape type="bsplinecurve"/>', '<shape type="sphere"><bsdf type="hair"/></shape>')
+                          '<shape type="bsplinecurve"/>', '<shape type="sphere"><bsdf type="hair"/></shape>',
+                          '<shape type="sphere"><float name="wide" value="2"/><bsdf type="roughplastic"><boolean name="odd" value="true"/></bsdf></shape>')
         _, said = self.render(path, "--vpls", 10)
-        for text in ("emitters of the kind projector: left out", "media: left out", "bsdfs of the kind hair are diffuse", "shapes of the kind bsplinecurve: left out"):
+        for text in ("emitters of the kind projector: left out", "media: left out", "bsdfs of the kind hair are diffuse", "shapes of the kind bsplinecurve: left out",
+                     "wide of sphere: left out", "odd of roughplastic: left out"):
             self.assertIn(text, said)
 
     def test_wrong_files_are_refused_by_name(self):

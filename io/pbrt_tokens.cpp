@@ -1,0 +1,157 @@
+#include "io/pbrt_tokens.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+
+#include "io/file_error.h"
+#include "io/find_beside.h"
+#include "io/gzip.h"
+#include "io/text_lines.h"
+
+namespace lumicut::io {
+
+namespace {
+
+constexpr size_t kDeepest = 64;                     // of files that include each other
+constexpr uint64_t kMostBytes = uint64_t{4} << 30;  // of all files together
+
+}  // namespace
+
+void PbrtTokens::open(const std::string& path) {
+  if (files_.size() >= kDeepest) throw FileError(path, "files include each other without end");
+  Source source{path, plain_text(unpacked(read_whole_file(path, kMostBytes), kMostBytes, path), path), 0, 1};
+  bytes_ += source.text.size();
+  if (bytes_ > kMostBytes) throw FileError(path, "the scene's files are too long together");
+  files_.push_back(std::move(source));
+}
+
+std::string PbrtTokens::where() const { return fmt::format("line {}", line_); }
+
+std::optional<PbrtToken> PbrtTokens::next() {
+  auto token = ahead_ ? std::exchange(ahead_, std::nullopt) : find();
+  if (token) line_ = token->line;
+  return token;
+}
+
+const std::optional<PbrtToken>& PbrtTokens::peek() {
+  if (!ahead_) ahead_ = find();
+  return ahead_;
+}
+
+void PbrtTokens::fail(const std::string& text) const { throw FileError(file(), fmt::format("{}: {}", where(), text)); }
+
+std::optional<PbrtToken> PbrtTokens::find() {
+  while (!files_.empty()) {
+    if (auto token = read(files_.back())) return token;
+    last_ = files_.back().path;
+    files_.pop_back();
+  }
+  return std::nullopt;
+}
+
+std::optional<PbrtToken> PbrtTokens::read(Source& s) {
+  const std::string& t = s.text;
+  while (s.at < t.size()) {
+    const char c = t[s.at];
+    if (c == '#') {
+      while (s.at < t.size() && t[s.at] != '\n') ++s.at;
+    } else if (c == ' ' || c == '\t' || c == '\n' || c == '\r') {
+      s.line += c == '\n';
+      ++s.at;
+    } else {
+      break;
+    }
+  }
+  if (s.at >= t.size()) return std::nullopt;
+  PbrtToken token;
+  token.line = s.line;
+  if (t[s.at] == '"') {
+    token.quoted = true;
+    for (++s.at; s.at < t.size() && t[s.at] != '"'; ++s.at) {
+      if (t[s.at] == '\n') fail("a text does not end in its line");
+      if (t[s.at] == '\\' && s.at + 1 < t.size()) ++s.at;
+      token.text += t[s.at];
+    }
+    if (s.at >= t.size()) fail("a text does not end");
+    ++s.at;
+  } else if (t[s.at] == '[' || t[s.at] == ']') {
+    token.text = t[s.at++];
+  } else {
+    while (s.at < t.size() && std::strchr(" \t\n\r\"[]#", t[s.at]) == nullptr) token.text += t[s.at++];
+  }
+  return token;
+}
+
+const PbrtParameter* PbrtParameters::find(const std::string& name) const {
+  asked_.insert(name);
+  for (const PbrtParameter& p : list)
+    if (p.name == name) return &p;
+  return nullptr;
+}
+double PbrtParameters::number(const std::string& name, double otherwise) const {
+  const PbrtParameter* p = find(name);
+  return p != nullptr && !p->numbers.empty() ? p->numbers[0] : otherwise;
+}
+Vec PbrtParameters::vector(const std::string& name, const Vec& otherwise) const {
+  const PbrtParameter* p = find(name);
+  return p != nullptr && p->numbers.size() >= 3 ? Vec{p->numbers[0], p->numbers[1], p->numbers[2]} : otherwise;
+}
+std::string PbrtParameters::word(const std::string& name, const std::string& otherwise) const {
+  const PbrtParameter* p = find(name);
+  return p != nullptr && !p->words.empty() ? p->words[0] : otherwise;
+}
+bool PbrtParameters::truth(const std::string& name, bool otherwise) const {
+  return word(name, otherwise ? "true" : "false") == "true";
+}
+std::vector<std::string> PbrtParameters::unread() const {
+  std::vector<std::string> out;
+  for (const PbrtParameter& p : list)
+    if (asked_.count(p.name) == 0 && std::find(out.begin(), out.end(), p.name) == out.end()) out.push_back(p.name);
+  return out;
+}
+
+double pbrt_number(const PbrtTokens& tokens, const PbrtToken& token, const std::string& what) {
+  double value = 0;
+  const char* begin = token.text.data() + (token.text.starts_with('+') ? 1 : 0);
+  const auto [end, error] = std::from_chars(begin, token.text.data() + token.text.size(), value);
+  if (token.quoted || error != std::errc() || end != token.text.data() + token.text.size() || !std::isfinite(value))
+    tokens.fail(fmt::format("{}: \"{}\" is no finite number", what, shown(token.text)));
+  return value;
+}
+
+PbrtParameters pbrt_parameters(PbrtTokens& tokens) {
+  PbrtParameters out;
+  while (tokens.peek() && tokens.peek()->quoted) {
+    const std::string head = tokens.next()->text;
+    PbrtParameter p;
+    const size_t begin = std::min(head.find_first_not_of(" \t"), head.size()), gap = head.find_first_of(" \t", begin);
+    if (gap == std::string::npos) tokens.fail(fmt::format("\"{}\" is no type and name of a parameter", shown(head)));
+    p.type = head.substr(begin, gap - begin);
+    const size_t name = std::min(head.find_first_not_of(" \t", gap), head.size());
+    p.name = head.substr(name, head.find_last_not_of(" \t") + 1 - name);
+    const auto add = [&](const PbrtToken& token) {
+      if (token.quoted || token.text == "true" || token.text == "false")
+        p.words.push_back(token.text);
+      else
+        p.numbers.push_back(pbrt_number(tokens, token, p.name));
+    };
+    auto token = tokens.next();
+    if (token && token->text == "[" && !token->quoted) {
+      for (token = tokens.next(); token && (token->quoted || token->text != "]"); token = tokens.next()) add(*token);
+      if (!token) tokens.fail(fmt::format("the values of \"{}\" do not end", shown(p.name)));
+    } else if (token) {
+      add(*token);
+    } else {
+      tokens.fail(fmt::format("\"{}\" has no value", shown(p.name)));
+    }
+    if (p.numbers.empty() && p.words.empty()) tokens.fail(fmt::format("\"{}\" has no value", shown(p.name)));
+    out.list.push_back(std::move(p));
+  }
+  return out;
+}
+
+}  // namespace lumicut::io

@@ -1,0 +1,31 @@
+// Spectra as linear Rec.709, and metals.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "io/affine.h"
+
+namespace lumicut::io {
+
+using Spectrum = std::vector<std::pair<double, double>>;  // wavelength in nm, rising, and value; linear between
+
+// CIE's integral over that of Y: a flat spectrum of 1 has Y = 1, and is not grey.
+Vec rgb_of_spectrum(const Spectrum& spectrum);
+// Of a reflectance or an index: even ones are grey.
+Vec rgb_of_reflectance(const Spectrum& spectrum);
+// Of a black body: of luminance 1; and its radiance, W/(sr·m²·nm), as rgb_of_spectrum has it.
+Vec blackbody(double kelvin);
+Vec blackbody_radiance(double kelvin);
+
+// A metal of complex index of refraction, as base colour and tint at 82 degrees of the library's GGX.
+struct Metal {
+  Vec colour, tint;
+};
+Metal metal_of(const Vec& eta, const Vec& k);
+// eta and k of "Cu", "Au", "Ag", "Al" and the like in red, green and blue.
+std::optional<std::pair<Vec, Vec>> named_metal(const std::string& name);
+
+}  // namespace lumicut::io
