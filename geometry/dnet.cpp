@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <string>
 
 #include "core/error.h"
 #include "core/rng.h"
+#include "geometry/delaunay_reporter.h"
 #include "geometry/hitting_set.h"
 #include "geometry/point_tree.h"
 
@@ -55,11 +57,13 @@ class Rounding {
     EpsilonNetOptions net_options = o_.net;
     net_options.seed = hash64(o_.seed, 2);
     const auto q = epsilon_net(points_, {}, std::min(1.0, o_.c1 / optimum), net_options).points;
-    tree_.clear_flags();
-    for (const uint32_t p : q) tree_.set_flag(p, true);
+    const bool delaunay = o_.structures == DnetOptions::Structures::delaunay;
+    std::optional<DelaunayReporter> reporter;
+    if (delaunay) reporter.emplace(points_, q);
+    start_set(q);
     std::vector<uint32_t> unhit;
     for (const uint32_t d : alive_)
-      if (!tree_.any_flagged_in(disks_[d])) unhit.push_back(d);
+      if (!hit(disks_[d])) unhit.push_back(d);
     std::vector<double> weight(points_.size(), 1.0);
     for (const uint32_t p : q) weight[p] = 0;  // line 5
     std::vector<uint32_t> s, members;
@@ -71,17 +75,24 @@ class Rounding {
       net_options.seed = hash64(o_.seed, 2 + static_cast<uint64_t>(phase));
       const auto r = total > 0 ? epsilon_net(points_, weight, std::min(1.0, o_.c2 / optimum), net_options).points
                                : std::vector<uint32_t>();
-      tree_.clear_flags();
-      for (const uint32_t p : r) tree_.set_flag(p, true);
+      start_set(r);
       s.clear();
       Rng rng(o_.seed, Stage::test, 3, static_cast<uint64_t>(phase));
       for (size_t i = unhit.size(); i > 1; --i)
         std::swap(unhit[i - 1], unhit[rng.next_below(static_cast<uint32_t>(i))]);
       for (const uint32_t d : unhit) {
-        if (tree_.any_flagged_in(disks_[d])) continue;
+        if (hit(disks_[d])) continue;
         members.clear();
+        if (delaunay) {
+          reporter->report(disks_[d], members);
+          // Sums round by the order of their parts.
+          std::sort(members.begin(), members.end(),
+                    [&](uint32_t a, uint32_t b) { return tree_.place(a) < tree_.place(b); });
+        } else {
+          tree_.for_each_in(disks_[d], [&](uint32_t p) { members.push_back(p); });
+        }
         double sum = 0;
-        tree_.for_each_in(disks_[d], [&](uint32_t p) { members.push_back(p), sum += weight[p]; });
+        for (const uint32_t p : members) sum += weight[p];
         ++result.reports;
         // A point of the disk by weight joins S.
         double u = rng.next_float() * sum;
@@ -91,7 +102,7 @@ class Rounding {
             pick = p;
             break;
           }
-        tree_.set_flag(pick, true);
+        add(pick);
         s.push_back(pick);
         if (sum <= o_.c3 * total / optimum) {
           ++result.reweighed;
@@ -143,10 +154,29 @@ class Rounding {
   }
 
  private:
+  // The set that disks are tested against.
+  void start_set(std::span<const uint32_t> set) {
+    if (o_.structures == DnetOptions::Structures::delaunay) {
+      nearest_.emplace(points_);
+    } else {
+      tree_.clear_flags();
+    }
+    for (const uint32_t p : set) add(p);
+  }
+  void add(uint32_t p) {
+    if (nearest_) {
+      nearest_->insert(p);
+    } else {
+      tree_.set_flag(p, true);
+    }
+  }
+  bool hit(const Disk& d) const { return nearest_ ? nearest_->hit(d) : tree_.any_flagged_in(d); }
+
   std::span<const Point2> points_;
   std::span<const Disk> disks_;
   const DnetOptions& o_;
   PointTree tree_;
+  std::optional<DelaunayNearest> nearest_;
   std::vector<uint32_t> alive_;
 };
 

@@ -34,6 +34,8 @@ class PointTree {
     }
   }
   size_t count_in(const Disk& d) const;
+  // Where a point stands in the tree's order.
+  uint32_t place(uint32_t id) const { return slot_[id]; }
 
   // Flags are for "is this disk hit by the set so far".
   void set_flag(uint32_t id, bool flagged);

@@ -4,6 +4,7 @@
 //   bench_hitting_set            the table
 //   bench_hitting_set scale      dnet to a million points, and the memory-bounded path
 //   bench_hitting_set local      local search alone by the size of exchanges, on the tight instance and on random ones
+//   bench_hitting_set reports    memory and reports of dnet (Table 7.2), by kd-tree and by Delaunay triangulations
 //   bench_hitting_set <n>        the table with n seconds for each integer program (default 60)
 #include <sys/wait.h>
 #include <unistd.h>
@@ -194,6 +195,35 @@ int scale() {
   return 0;
 }
 
+int reports() {
+#ifdef LUMICUT_HAS_CGAL
+  std::printf("%-8s %-9s %7s | %7s %7s %8s %8s | %8s %8s %8s\n", "points", "disks", "number", "set", "s kd", "MB kd",
+              "s Delau", "MB Delau", "total", "doubling");
+  for (const char* family : {"uniform", "gauss9"})
+    for (const Case& c : {Case{family, 50000, "RND", 500000, 0.01}, Case{family, 50000, "RND", 50000, 0.1},
+                          Case{family, 50000, "FIX", 0, 0.001}}) {
+      const auto p = point_set(c.points, c.n / sized<size_t>(1, 50), 1);
+      const auto disks = make_disks(c, p);
+      for (const auto structures : {DnetOptions::Structures::kd_tree, DnetOptions::Structures::delaunay})
+        apart([&] {
+          const double before = peak_megabytes();
+          DnetOptions o;
+          o.net.mode = EpsilonNetOptions::Mode::thesis;
+          o.net.c0 = 10;  // the thesis's
+          o.structures = structures;
+          DnetResult d;
+          const double s = time_of([&] { d = dnet_hitting_set(p, disks, o); });
+          if (structures == DnetOptions::Structures::kd_tree)
+            std::printf("%-8s %-3s %-5g %7zu | %7zu %7.2f %8.1f", c.points, c.kind, c.r, disks.size(), d.points.size(),
+                        s, peak_megabytes() - before);
+          else
+            std::printf(" %7.2f %8.1f | %8zu %8zu\n", s, peak_megabytes() - before, d.reports, d.reweighed);
+        });
+    }
+#endif
+  return 0;
+}
+
 int local() {
   std::printf("%-34s %8s %8s %8s | %8s %7s | %8s %7s | %8s %7s\n", "instance", "number", "at most", "start", "(2,1)",
               "s", "(3,2)", "s", "(4,3)", "s");
@@ -249,5 +279,6 @@ int main(int argc, char** argv) {
   lumicut::bench::print_header("Hitting sets for disks", argc, argv, 1);
   if (argc > 1 && !std::strcmp(argv[1], "scale")) return lumicut::bench::scale();
   if (argc > 1 && !std::strcmp(argv[1], "local")) return lumicut::bench::local();
+  if (argc > 1 && !std::strcmp(argv[1], "reports")) return lumicut::bench::reports();
   return lumicut::bench::table(argc > 1 ? std::max(1, std::atoi(argv[1])) : 60);
 }

@@ -16,7 +16,7 @@ namespace lumicut {
 namespace {
 
 struct Arguments {
-  std::string points, disks, ranges, shape, out = "-", picture, method = "default", start;
+  std::string points, disks, ranges, shape, out = "-", picture, method = "default", start, structures = "kd-tree";
   bool drop_empty = false;
   int size = 1000, k = 3;
 };
@@ -53,7 +53,10 @@ std::vector<uint32_t> solve(const Arguments& a, const std::vector<Point2>& point
 #ifdef LUMICUT_HAS_CGAL
     DnetOptions o;
     o.drop_empty_disks = a.drop_empty;
-    return dnet_hitting_set(points, disks, o).points;
+    if (a.structures == "delaunay") o.structures = DnetOptions::Structures::delaunay;
+    const DnetResult d = dnet_hitting_set(points, disks, o);
+    std::fprintf(stderr, "disks reported %zu, of which reweighed %zu\n", d.reports, d.reweighed);
+    return d.points;
 #else
     fail_argument("--method dnet: this command was built without CGAL");
 #endif
@@ -131,6 +134,10 @@ Command add_hitting_set(CLI::App& app) {
                       "Of --method local: CSV of indices that hit every disk (none: pruned greedy)");
   command->add_option("--exchange", a->k, "Of --method local: most points that one step gives up for fewer")
       ->check(CLI::Range(2, 4));
+  command
+      ->add_option("--structures", a->structures,
+                   "Of --method dnet: a kd-tree, or the thesis's Delaunay triangulations; the sets are the same")
+      ->check(CLI::IsMember({"kd-tree", "delaunay"}));
   command->add_flag("--drop-empty", a->drop_empty, "Leave out disks without points rather than refuse them");
   return [a] { return run(*a); };
 }
