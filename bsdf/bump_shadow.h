@@ -9,8 +9,8 @@
 
 namespace lumicut {
 
-// `cosine`: n·l, above 0.
-inline float bump_shadow(const SurfacePoint& p, float cosine, const Vec3f& to_light) {
+// `cosine`: n·l, above 0. Out of line, so that `reflectance` stays small enough to be inlined.
+[[gnu::noinline]] inline float bump_shadow(const SurfacePoint& p, float cosine, const Vec3f& to_light) {
   const float over = cosine * dot(p.smooth, p.normal);
   if (over == 0.0f) return 1.0f;
   const float g = std::min(1.0f, std::max(0.0f, dot(p.smooth, to_light) / over));
@@ -35,11 +35,11 @@ HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// SIMD counterpart of bump_shadow; `smooth` is 0 in lanes whose normal is not bent.
-HWY_INLINE V BumpShadow(D d, const V3& smooth, const V3& normal, V cosine, const V3& to_light) {
+// SIMD counterpart of bump_shadow, by the cosines n·l, s·n and s·l; the last two are 0 in lanes whose normal is not bent.
+HWY_INLINE V BumpShadow(D d, V cosine, V smooth_normal, V smooth_light) {
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-  const V over = hn::Mul(cosine, Dot(smooth, normal));
-  const V g = hn::Min(one, hn::Max(zero, hn::Div(Dot(smooth, to_light), over)));
+  const V over = hn::Mul(cosine, smooth_normal);
+  const V g = hn::Min(one, hn::Max(zero, hn::Div(smooth_light, over)));
   return hn::IfThenElse(hn::Eq(over, zero), one, hn::Mul(g, hn::MulAdd(g, hn::Sub(one, g), one)));
 }
 

@@ -79,6 +79,7 @@ auto with_lobe(const SurfacePoint& p, const Fn& fn) {
 #define LUMICUT_BSDF_LOBES_SIMD_
 #endif
 
+#include "bsdf/bump_shadow.h"
 #include "bsdf/burley.h"
 #include "bsdf/lambert.h"
 #include "bsdf/lanes-inl.h"
@@ -124,10 +125,15 @@ HWY_INLINE DiffuseShape LoadDiffuse(D d, const Points& points, size_t p) {
   if (shape.bent) shape.smooth = Load3(d, points.smooth, p);
   return shape;
 }
-// Of Lambert's part: `view` is n·m.
-HWY_INLINE V DiffuseFactor(D d, const DiffuseShape& s, V view, V cosine, V beta) {
-  const V even = DiffuseFalloff(d, s.falloff, cosine);
-  return s.burley ? hn::Mul(even, BurleyFactor(d, s.retro, s.dim, view, cosine, beta)) : even;
+// n·m, n·l, m·l; and where any point is bent s·n and s·l.
+struct DiffuseCosines {
+  V view, light, beta, smooth_normal, smooth_light;
+};
+// Of Lambert's part.
+HWY_INLINE V DiffuseFactor(D d, const DiffuseShape& s, const DiffuseCosines& c) {
+  V factor = DiffuseFalloff(d, s.falloff, c.light);
+  if (s.burley) factor = hn::Mul(factor, BurleyFactor(d, s.retro, s.dim, c.view, c.light, c.beta));
+  return s.bent ? hn::Mul(factor, BumpShadow(d, c.light, c.smooth_normal, c.smooth_light)) : factor;
 }
 // Bound of it over lights of at most `cosine` and views of at least `view`, where the rest of a product is bounded with the
 // light's cosine over `steep`. `rise`: the largest k of bsdf/burley.h, at least 0.

@@ -7,7 +7,6 @@
 #define LUMICUT_BSDF_REFLECTANCE_INL_H_
 #endif
 
-#include "bsdf/bump_shadow.h"
 #include "bsdf/lanes-inl.h"
 #include "bsdf/lobes.h"
 
@@ -31,9 +30,11 @@ HWY_INLINE LobeSums LobesTowards(D d, const V3& normal, const V3& mirror, const 
     const LobeValue v = ValueOfLobes<kLobes>(d, shape, {normal, mirror, to_light, cosine, beta});
     parts.specular = v.lobe;
     if constexpr (kLobes == Lobes::all) {
-      parts.diffuse = DiffuseFactor(d, shape.diffuse, Dot(normal, mirror), cosine, beta);
-      if (shape.diffuse.bent)
-        parts.diffuse = hn::Mul(parts.diffuse, BumpShadow(d, shape.diffuse.smooth, normal, cosine, to_light));
+      const DiffuseShape& even = shape.diffuse;
+      DiffuseCosines cosines{Dot(normal, mirror), cosine, beta, hn::Zero(d), hn::Zero(d)};
+      if (even.bent)
+        cosines.smooth_normal = Dot(even.smooth, normal), cosines.smooth_light = Dot(even.smooth, to_light);
+      parts.diffuse = DiffuseFactor(d, even, cosines);
       parts.grazing = hn::Mul(v.lobe, v.fresnel);
       parts.specular = hn::NegMulAdd(v.lobe, v.fresnel, v.lobe);
     }

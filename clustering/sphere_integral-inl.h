@@ -84,7 +84,7 @@ HWY_INLINE V MeanOfCosines(D d, const SphereCone& c, const V3& normal, const V3&
   auto above = LiesAbove(d, c, na);
   if constexpr (kCosine) above = hn::And(above, LiesAbove(d, c, la));
   if constexpr (kShaped) above = hn::And(above, hn::Eq(hn::Add(shape.falloff, hn::Add(shape.retro, shape.dim)), zero));
-  if (hn::AllTrue(d, above)) {
+  if (!(kShaped && shape.bent) && hn::AllTrue(d, above)) {
     // Means of cos and cos² to the axis.
     const V first = hn::NegMulAdd(half, c.versine, one);
     if constexpr (!kCosine) return hn::Mul(na, first);
@@ -105,9 +105,14 @@ HWY_INLINE V MeanOfCosines(D d, const SphereCone& c, const V3& normal, const V3&
        hn::IfThenElse(upright, hn::Neg(hn::Mul(sign, c.axis.x)), hn::Mul(t.z, inverse))};
   const V3 b = Cross(c.axis, t);
   const V nt = Dot(normal, t), nb = Dot(normal, b), lt = Dot(facing, t), lb = Dot(facing, b);
-  V nm = zero, ma = zero, mt = zero, mb = zero;
-  if constexpr (kShaped)
+  V nm = zero, ma = zero, mt = zero, mb = zero, sn = zero, sa = zero, st = zero, sb = zero;
+  if constexpr (kShaped) {
     if (shape.burley) nm = Dot(normal, mirror), ma = Dot(mirror, c.axis), mt = Dot(mirror, t), mb = Dot(mirror, b);
+    if (shape.bent) {
+      sn = Dot(shape.smooth, normal), sa = Dot(shape.smooth, c.axis);
+      st = Dot(shape.smooth, t), sb = Dot(shape.smooth, b);
+    }
+  }
   V sum = zero;
   for (size_t ring = 0; ring < 3; ++ring) {
     const V versine = hn::Mul(c.versine, hn::Set(d, kRing[ring])), cosine = hn::Sub(one, versine);
@@ -120,9 +125,10 @@ HWY_INLINE V MeanOfCosines(D d, const SphereCone& c, const V3& normal, const V3&
       if constexpr (kCosine)
         both = hn::Mul(cx, hn::Max(zero, hn::MulAdd(cosine, la, hn::MulAdd(x, lt, hn::Mul(y, lb)))));
       if constexpr (kShaped) {
-        V beta = zero;
-        if (shape.burley) beta = hn::MulAdd(cosine, ma, hn::MulAdd(x, mt, hn::Mul(y, mb)));
-        both = hn::Mul(both, DiffuseFactor(d, shape, nm, cx, beta));
+        DiffuseCosines cosines{nm, cx, zero, sn, zero};
+        if (shape.burley) cosines.beta = hn::MulAdd(cosine, ma, hn::MulAdd(x, mt, hn::Mul(y, mb)));
+        if (shape.bent) cosines.smooth_light = hn::MulAdd(cosine, sa, hn::MulAdd(x, st, hn::Mul(y, sb)));
+        both = hn::Mul(both, DiffuseFactor(d, shape, cosines));
       }
       of_ring = hn::Add(of_ring, both);
     }
@@ -265,11 +271,7 @@ HWY_INLINE LobeSums SphereLobes(D d, const Vpl& light, const Points& points, siz
   V3 mirror{zero, zero, zero};
   if constexpr (kLobes != Lobes::none) mirror = Load3(d, points.mirror, p);
   const LobeShape shape = LoadShape<kLobes>(d, points, p);
-  V even = MeanOfCosines<kLobes == Lobes::all, kCosine>(d, cone, normal, facing, mirror, shape.diffuse);
-  // What a bent normal lets through is that of the sphere's centre.
-  if constexpr (kLobes == Lobes::all)
-    if (shape.diffuse.bent)
-      even = hn::Mul(even, BumpShadow(d, shape.diffuse.smooth, normal, hn::Max(na, hn::Set(d, 1e-6f)), axis));
+  const V even = MeanOfCosines<kLobes == Lobes::all, kCosine>(d, cone, normal, facing, mirror, shape.diffuse);
   parts.diffuse = hn::IfThenElseZero(lit, hn::Mul(cone.geometry, even));
   if constexpr (kLobes != Lobes::none) {
     if (kLobes == Lobes::cosine && hn::AllFalse(d, hn::And(lit, RisesAbove(d, cone, Dot(mirror, axis))))) return parts;

@@ -111,8 +111,6 @@ class Reader {
 
   // ---- Numbers of accessors
 
-  static constexpr size_t kMostWithoutBuffer = size_t{1} << 24;
-
   // `width` numbers an element, integers of normalized accessors as shares of 1.
   std::vector<double> numbers(int index, int width, const std::string& where) const {
     const auto& accessor = at(model_.accessors, index, where);
@@ -122,11 +120,6 @@ class Reader {
     if (accessor.sparse.isSparse) fail(name, "is sparse, which is not supported");
     const int bytes = gltf::GetComponentSizeInBytes(static_cast<uint32_t>(accessor.componentType));
     if (accessor.count == 0) return {};
-    if (accessor.bufferView < 0) {  // all 0
-      if (accessor.count > kMostWithoutBuffer)
-        fail(name, fmt::format("has {} elements and no bufferView: more than {}", accessor.count, kMostWithoutBuffer));
-      return std::vector<double>(accessor.count * static_cast<size_t>(width));
-    }
     const auto& view = at(model_.bufferViews, accessor.bufferView, name);
     const auto& buffer = at(model_.buffers, view.buffer, fmt::format("bufferViews[{}]", accessor.bufferView));
     const int stride = accessor.ByteStride(view);

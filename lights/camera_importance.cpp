@@ -6,6 +6,7 @@
 #include <span>
 
 #include "bsdf/straight_glass.h"
+#include "core/even_sequence.h"
 #include "core/parallel.h"
 #include "lights/falloff.h"
 #include "lights/light_paths.h"
@@ -24,13 +25,6 @@ size_t side_of(const Vec3f& n) {
   const Vec3f a{std::abs(n.x), std::abs(n.y), std::abs(n.z)};
   const int axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
   return static_cast<size_t>(2 * axis + (n[axis] < 0.0f ? 1 : 0));
-}
-
-// A point of the plane's even sequence. [Roberts 2018: R2]
-Vec2f r2(uint64_t i) {
-  const double x = 0.5 + 0.7548776662466927 * static_cast<double>(i),
-               y = 0.5 + 0.5698402909980532 * static_cast<double>(i);
-  return {static_cast<float>(x - std::floor(x)), static_cast<float>(y - std::floor(y))};
 }
 
 // Emitters that are treated alike: one each, or so many near each other that no group has more than its share of power.
@@ -168,7 +162,7 @@ std::vector<CameraImportance::CameraPoint> CameraImportance::trace_camera_paths(
     for (size_t i = begin; i < end; ++i) {
       Rng rng(seed, Stage::importance, i);
       float weight = 1.0f;
-      const auto ray = camera_ray(scene, frame, r2(i), rng);
+      const auto ray = camera_ray(scene, frame, even_point(i), rng);
       if (!ray) continue;
       const auto seen = what_camera_sees(scene, *ray, rng, weight);
       if (!seen || !(weight > 0.0f)) continue;

@@ -27,15 +27,7 @@ lumicut_result trace(lumicut_scene scene, const lumicut_render_desc* frame, uint
     FrameOptions options = to_frame_options(desc);
     options.seed = seed;
     if (desc.passes != 1) options.camera_samples = {seed, pass * options.samples};
-    const Rect& crop = options.crop;
-    Rect part = crop;
-    if (rect != nullptr) {
-      const lumicut_tile in = read(rect);
-      part = {in.x0, in.y0, in.x1, in.y1};
-    }
-    if (part.x0 >= part.x1 || part.y0 >= part.y1 || part.x0 < crop.x0 || part.y0 < crop.y0 || part.x1 > crop.x1 ||
-        part.y1 > crop.y1)
-      fail_argument("lumicut_tile: is not a rectangle inside the crop");
+    const Rect part = part_of(options.crop, rect);
     const size_t count = size_t{part.width()} * part.height() * options.samples;
     const Progress progress;
     s.device->arena.run([&] {

@@ -76,17 +76,7 @@ lumicut_result lumicut_render_read(lumicut_render render, const char* channel, c
     const std::optional<size_t> group = group_named(channel, r.groups());
     if (!group) channel_named(channel);
     if (out == nullptr) fail_argument("lumicut_render_read: out is NULL");
-    const Rect& crop = r.options.crop;
-    Rect part = crop;
-    if (rect != nullptr) {
-      const lumicut_tile in = read(rect);
-      part = {in.x0, in.y0, in.x1, in.y1};
-    }
-    if (part.x0 >= part.x1 || part.y0 >= part.y1 || part.x0 < crop.x0 || part.y0 < crop.y0 || part.x1 > crop.x1 ||
-        part.y1 > crop.y1)
-      fail_argument("lumicut_tile: (" + number_text(uint64_t{part.x0}) + ", " + number_text(uint64_t{part.y0}) + ", " +
-                    number_text(uint64_t{part.x1}) + ", " + number_text(uint64_t{part.y1}) +
-                    ") is not a rectangle inside the crop");
+    const Rect part = part_of(r.options.crop, rect);
     if (group)
       r.read_group(*group, part, out);
     else

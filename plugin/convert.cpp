@@ -612,6 +612,20 @@ static PixelFilter to_filter(const FieldValidator& c, const lumicut_render_desc&
   return filter;
 }
 
+Rect part_of(const Rect& crop, const lumicut_tile* rect) {
+  Rect part = crop;
+  if (rect != nullptr) {
+    const lumicut_tile in = read(rect);
+    part = {in.x0, in.y0, in.x1, in.y1};
+  }
+  if (part.x0 >= part.x1 || part.y0 >= part.y1 || part.x0 < crop.x0 || part.y0 < crop.y0 || part.x1 > crop.x1 ||
+      part.y1 > crop.y1)
+    fail_argument("lumicut_tile: (" + number_text(uint64_t{part.x0}) + ", " + number_text(uint64_t{part.y0}) + ", " +
+                  number_text(uint64_t{part.x1}) + ", " + number_text(uint64_t{part.y1}) +
+                  ") is not a rectangle inside the crop");
+  return part;
+}
+
 FrameOptions to_frame_options(const lumicut_render_desc& in) {
   const FieldValidator c("lumicut_render_desc");
   c.integer("width", in.width, 1, 65536);

@@ -51,6 +51,8 @@ void check_points(const Scene& scene, const lumicut_point* points, uint64_t coun
 
 // Size, crop, samples and tiles.
 FrameOptions to_frame_options(const lumicut_render_desc& in);
+// The host's rectangle, NULL for the whole crop. Throws Error where it does not lie inside.
+Rect part_of(const Rect& crop, const lumicut_tile* rect);
 IterationOptions to_pass_options(const lumicut_render_desc& in);
 // Fails where that is more than the machine's memory.
 void check_render_bytes(const Rect& crop, uint64_t bytes);

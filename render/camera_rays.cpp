@@ -1,5 +1,6 @@
 #include "render/camera_rays.h"
 
+#include "core/even_sequence.h"
 #include "core/parallel.h"
 #include "core/rng.h"
 
@@ -7,15 +8,8 @@ namespace lumicut {
 
 namespace {
 
-// Point i of a sequence that fills the unit square evenly for any count. [Roberts 2018]
-Vec2f rank1(uint64_t i, Vec2f shift, double step_x, double step_y) {
-  const auto at = static_cast<double>(i);
-  const double x = 0.5 + shift.x + at * step_x, y = 0.5 + shift.y + at * step_y;
-  return {static_cast<float>(x - std::floor(x)), static_cast<float>(y - std::floor(y))};
-}
-// R2 in the pixel; on the lens two steps of R4, which no whole numbers relate to those: together they fill all four
+// In the pixel R2, on the lens two steps of R4, which no whole numbers relate to those: together they fill all four
 // dimensions.
-Vec2f in_pixel(uint64_t i, Vec2f shift) { return rank1(i, shift, 0.7548776662466927, 0.5698402909980532); }
 Vec2f on_lens(uint64_t i, Vec2f shift) { return rank1(i, shift, 0.8566748838545029, 0.7338918566271260); }
 
 }  // namespace
@@ -31,7 +25,7 @@ void CameraRays::of_pixel(uint32_t x, uint32_t y, RayHit* rays, float* cosines) 
   const Vec2f shift = centred ? Vec2f{0, 0} : Vec2f{rng.next_float(), rng.next_float()};
   const Vec2f lens_shift = {rng.next_float(), rng.next_float()};
   for (uint32_t s = 0; s < options_.samples; ++s) {
-    const Vec2f at = in_pixel(first + s, shift), lens = on_lens(first + s, lens_shift);
+    const Vec2f at = even_point(first + s, shift), lens = on_lens(first + s, lens_shift);
     // The plain box as ever: x + u, which in floats is not (x + 1/2) + (u − 1/2).
     const Vec2f place =
         options_.filter == PixelFilter{} ? at : Vec2f{0.5f + filter_.offset(at.x), 0.5f + filter_.offset(at.y)};

@@ -55,8 +55,6 @@ uint64_t mix(uint64_t h, uint64_t x) {
 
 }  // namespace
 
-double length(const Point& a) { return std::sqrt(dot(a, a)); }
-
 void Box::extend(const Point& p) {
   for (size_t k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
 }

@@ -5,20 +5,18 @@
 #include <cstdint>
 #include <vector>
 
+#include "io/affine.h"
 #include "io/scene_data.h"
 
 namespace lumicut::tools {
 
-using Point = std::array<double, 3>;
-
-inline Point operator+(const Point& a, const Point& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-inline Point operator-(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-inline Point operator*(const Point& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
-inline double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-inline Point cross(const Point& a, const Point& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-double length(const Point& a);
+using Point = io::Vec;
+using io::operator+;
+using io::operator-;
+using io::operator*;
+using io::cross;
+using io::dot;
+using io::length;
 
 struct Box {
   Point lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};

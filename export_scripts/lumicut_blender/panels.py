@@ -37,6 +37,14 @@ class LibraryPanel(Panel):
         return super().poll(context) and bool(properties.tables.integrators)
 
 
+class VirtualLightsPanel(LibraryPanel):
+    """One that counts where virtual lights give the light."""
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and lit_by_virtual_lights(context.scene.lumicut)
+
+
 def split(layout):
     layout.use_property_split = True
     layout.use_property_decorate = False
@@ -225,13 +233,9 @@ class LUMICUT_PT_max_bounces(LibraryPanel, bpy.types.Panel):
         draw_parameters(split(self.layout), context.scene.lumicut, "bounces")
 
 
-class LUMICUT_PT_clamping(LibraryPanel, bpy.types.Panel):
+class LUMICUT_PT_clamping(VirtualLightsPanel, bpy.types.Panel):
     bl_label = "Clamping"
     bl_parent_id = "LUMICUT_PT_light_paths"
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and lit_by_virtual_lights(context.scene.lumicut)
 
     def draw(self, context):
         layout, settings = split(self.layout), context.scene.lumicut
@@ -239,13 +243,9 @@ class LUMICUT_PT_clamping(LibraryPanel, bpy.types.Panel):
         layout.prop(settings, "max_shininess")
 
 
-class LUMICUT_PT_caustics(LibraryPanel, bpy.types.Panel):
+class LUMICUT_PT_caustics(VirtualLightsPanel, bpy.types.Panel):
     bl_label = "Corners and Caustics"
     bl_parent_id = "LUMICUT_PT_light_paths"
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and lit_by_virtual_lights(context.scene.lumicut)
 
     def draw(self, context):
         layout, settings = split(self.layout), context.scene.lumicut

@@ -137,8 +137,7 @@ Command add_balltree(CLI::App& app) {
       ->check(CLI::IsMember({"nearest", "containing", "intersecting", "contained"}));
   command->add_option("--count", a->count, "Of nearest leaves")->check(CLI::Range(1, 1000000));
   command->add_option("--out", a->out, "CSV of the answers (-: standard output)");
-  command->add_option("--picture", a->picture, "Picture of a tree in the plane, .svg or .png");
-  command->add_option("--size", a->size, "Its size in pixels")->check(CLI::Range(50, 10000));
+  add_picture(*command, a->picture, a->size, "Picture of a tree in the plane, .svg or .png");
   return [a] {
     if (a->builder == "all" && (!a->queries.empty() || !a->picture.empty()))
       fail_argument("--builder all: queries and pictures are of one builder's tree");

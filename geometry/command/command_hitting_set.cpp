@@ -122,8 +122,7 @@ Command add_hitting_set(CLI::App& app) {
                       "CSV: the corners of a convex polygon around 0,0, counter-clockwise; --disks then holds the "
                       "places of copies and how large they are");
   command->add_option("--out", a->out, "CSV of the chosen points: index,x,y (-: standard output)");
-  command->add_option("--picture", a->picture, "Picture of the instance, .svg or .png");
-  command->add_option("--size", a->size, "Its size in pixels")->check(CLI::Range(50, 10000));
+  add_picture(*command, a->picture, a->size, "Picture of the instance, .svg or .png");
   command
       ->add_option("--method", a->method,
                    "default: all we know; greedy, pruned: the point that hits most, again and again, and without what "

@@ -72,8 +72,7 @@ Command add_net(CLI::App& app) {
   command->add_option("--c0", a->c0, "Size of the random sample, over epsilon (0: 0.7, with --thesis 7)")
       ->check(CLI::Range(0.0, 1e6));
   command->add_option("--seed", a->seed, "Of the sample");
-  command->add_option("--picture", a->picture, "Picture of points and net, .svg or .png");
-  command->add_option("--size", a->size, "Its size in pixels")->check(CLI::Range(50, 10000));
+  add_picture(*command, a->picture, a->size, "Picture of points and net, .svg or .png");
   command->add_flag("--thesis", a->thesis, "The thesis's construction rather than the certified one");
   return [a] { return run(*a); };
 }

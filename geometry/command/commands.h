@@ -27,6 +27,8 @@ std::istringstream open_text(const std::string& path);
 // Refuses a place that cannot be written, before any work. "-" is standard output, "" is none.
 void check_output(const std::string& path);
 void write_text(const std::string& path, const std::string& text);
+// --picture, told by `what`, and --size.
+void add_picture(CLI::App& command, std::string& path, int& size, const std::string& what);
 // index,x,y
 void write_points(const std::string& path, const std::vector<Point2>& points, const std::vector<uint32_t>& chosen);
 

@@ -55,6 +55,11 @@ std::vector<uint32_t> read_indices(const std::string& path, size_t count, const 
   return indices;
 }
 
+void add_picture(CLI::App& command, std::string& path, int& size, const std::string& what) {
+  command.add_option("--picture", path, what);
+  command.add_option("--size", size, "Its size in pixels")->check(CLI::Range(50, 10000));
+}
+
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }

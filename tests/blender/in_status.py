@@ -665,22 +665,19 @@ def material_output(m):
 
 @feature("Materials", "displacement as bump")
 def _(test):
-    m = bpy.data.materials["Red"]
-    node = m.node_tree.nodes.new("ShaderNodeDisplacement")
-    m.node_tree.links.new(m.node_tree.nodes.new("ShaderNodeTexChecker").outputs["Fac"], node.inputs["Height"])
-    m.node_tree.links.new(node.outputs[0], material_output(m).inputs["Displacement"])
+    _displace(bpy.data.materials["Red"], "ShaderNodeTexChecker")
 
 
 @feature("Materials", "true displacement")
 def _(test):
     m = bpy.data.materials["Red"]
-    _displace(m)
+    _displace(m, "ShaderNodeTexNoise")
     m.cycles.displacement_method = "DISPLACEMENT"
 
 
-def _displace(m):
+def _displace(m, height):
     node = m.node_tree.nodes.new("ShaderNodeDisplacement")
-    m.node_tree.links.new(m.node_tree.nodes.new("ShaderNodeTexNoise").outputs["Fac"], node.inputs["Height"])
+    m.node_tree.links.new(m.node_tree.nodes.new(height).outputs["Fac"], node.inputs["Height"])
     m.node_tree.links.new(node.outputs[0], material_output(m).inputs["Displacement"])
 
 

@@ -2,12 +2,9 @@
 #include "io/file_error.h"
 #include "io/scene_gltf.h"
 #include "tests/fuzz/fuzz.h"
+#include "tests/fuzz/libpng_leak.h"
 
 using namespace lumicut;
-
-// As in texture.cpp: OpenImageIO's reader of PNG.
-extern "C" const char* __asan_default_options() { return "fast_unwind_on_malloc=0"; }
-extern "C" const char* __lsan_default_suppressions() { return "leak:libpng16\n"; }
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const fuzz::Folder folder;

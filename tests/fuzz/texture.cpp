@@ -3,13 +3,9 @@
 #include "io/image_file.h"
 #include "io/texture_store.h"
 #include "tests/fuzz/fuzz.h"
+#include "tests/fuzz/libpng_leak.h"
 
 using namespace lumicut;
-
-// OpenImageIO 2.4's reader of PNG keeps an error's text in a string when libpng's longjmp leaves its callback. Allocations
-// are traced through libraries without frame pointers, and the library is named, which needs no symbolizer.
-extern "C" const char* __asan_default_options() { return "fast_unwind_on_malloc=0"; }
-extern "C" const char* __lsan_default_suppressions() { return "leak:libpng16\n"; }
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const fuzz::Folder folder;

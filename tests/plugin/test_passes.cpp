@@ -149,11 +149,12 @@ TEST(Passes, SpheresShrinkFromPassToPass) {
   EXPECT_NEAR(mean_radius(16) / mean_radius(1), 0.5, 0.05);
 }
 
-TEST(Passes, OnlyTracedLightsAreCompensated) {
+namespace {
+void expect_refused_with_the_hosts_lights(const char* parameter) {
   const api::Device device(1);
   const api::Scene s = scene(device);
   const api::Integrator i = integrator(device, 60);
-  ASSERT_EQ(lumicut_integrator_set(i.get(), "compensate", "true"), LUMICUT_OK);
+  ASSERT_EQ(lumicut_integrator_set(i.get(), parameter, "true"), LUMICUT_OK);
   lumicut_vpl light{};
   light.position[2] = 0.5f;
   light.intensity[0] = light.intensity[1] = light.intensity[2] = 1;
@@ -161,23 +162,13 @@ TEST(Passes, OnlyTracedLightsAreCompensated) {
   lumicut_render render = nullptr;
   const auto f = frame(8, 8);
   EXPECT_EQ(lumicut_render_start(i.get(), s.get(), &f, &render), LUMICUT_INVALID_ARGUMENT);
-  EXPECT_NE(std::string(lumicut_last_error()).find("compensate"), std::string::npos);
+  EXPECT_NE(std::string(lumicut_last_error()).find(parameter), std::string::npos);
 }
+}  // namespace
 
-TEST(Passes, ImportanceIsRefusedWithTheHostsLights) {
-  const api::Device device(1);
-  const api::Scene s = scene(device);
-  const api::Integrator i = integrator(device, 60);
-  ASSERT_EQ(lumicut_integrator_set(i.get(), "importance", "true"), LUMICUT_OK);
-  lumicut_vpl light{};
-  light.position[2] = 0.5f;
-  light.intensity[0] = light.intensity[1] = light.intensity[2] = 1;
-  ASSERT_EQ(lumicut_integrator_set_lights(i.get(), &light, 1), LUMICUT_OK);
-  lumicut_render render = nullptr;
-  const auto f = frame(8, 8);
-  EXPECT_EQ(lumicut_render_start(i.get(), s.get(), &f, &render), LUMICUT_INVALID_ARGUMENT);
-  EXPECT_NE(std::string(lumicut_last_error()).find("importance"), std::string::npos);
-}
+TEST(Passes, OnlyTracedLightsAreCompensated) { expect_refused_with_the_hosts_lights("compensate"); }
+
+TEST(Passes, ImportanceIsRefusedWithTheHostsLights) { expect_refused_with_the_hosts_lights("importance"); }
 
 TEST(Passes, ACheckpointIsShownOnlyWhereItIsKept) {
   const api::Device device(1);

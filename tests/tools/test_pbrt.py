@@ -26,6 +26,12 @@ class SceneFiles(cli.Cli):
         path.write_text(text if isinstance(text, str) else json.dumps(text))
         return path
 
+    def write_exr(self, name, pixels):
+        out = test_models.oiio.ImageOutput.create(str(self.folder / name))
+        out.open(str(self.folder / name), test_models.oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "float"))
+        out.write_image(np.ascontiguousarray(pixels))
+        out.close()
+
     def render(self, path, *words, layers="radiance", method="exhaustive"):
         out = self.folder / (path.name + ".exr")
         done = lumicut("render", path, "-o", out, "--layers", layers, "-i", method, "--seed", 1, *words)
@@ -38,6 +44,16 @@ class SceneFiles(cli.Cli):
         self.assertEqual(a.shape, b.shape)
         self.assertGreater(b.max(), 0)
         self.assertLess((np.abs(a - b).max(axis=2) > share * b.max()).mean(), off)
+
+    def assert_is_of_material(self, scene, keys):
+        """It looks as it does with its materials written down as JSON."""
+        self.assert_ends(lumicut("convert", scene, self.folder / "ball.json"), OK)
+        again = json.loads((self.folder / "ball.json").read_text())
+        for material in again["materials"]:
+            name = material["name"]
+            material.clear()
+            material.update({"name": name} | keys)
+        self.assert_same(self.render(scene, "--vpls", 100)[0], self.render(self.write("again.json", again), "--vpls", 100)[0])
 
     def lamp(self, scene, place="7x7"):
         """Radiance of a floor of reflectance .5 in the middle, of light that comes straight from lamps."""
@@ -129,14 +145,7 @@ class Pbrt(SceneFiles):
             with self.subTest(text):
                 scene = self.write("ball.pbrt", look((0, 0, 5), (0, 0, 0)) + HEAD + 'Camera "perspective" "float fov" 40\nWorldBegin\n'
                                    f'LightSource "distant" "rgb L" [2 2 2] "point3 from" [1 2 3] "point3 to" [0 0 0]\nLightSource "infinite" "rgb L" [.1 .2 .3]\nMaterial {text}\nShape "sphere" "float radius" 1.2')
-                self.assert_ends(lumicut("convert", scene, self.folder / "ball.json"), OK)
-                again = json.loads((self.folder / "ball.json").read_text())
-                # The same ball of the material that is written down.
-                for material in again["materials"]:
-                    name = material["name"]
-                    material.clear()
-                    material.update({"name": name} | keys)
-                self.assert_same(self.render(scene, "--vpls", 100)[0], self.render(self.write("again.json", again), "--vpls", 100)[0])
+                self.assert_is_of_material(scene, keys)
 
     def test_checkers_mixes_and_scales_are_computed_at_the_hit(self):
         texture = ('Texture "two" "spectrum" "checkerboard" "float uscale" 2 "float vscale" 2 "rgb tex1" [ .8 .8 .8 ] "rgb tex2" [ .2 .2 .2 ]\n'
@@ -163,12 +172,6 @@ class Pbrt(SceneFiles):
                                'Translate 50 50 50 Shape "sphere"')
             # At the pole half a texel is mixed with the other one.
             self.assertGreater(self.render(scene, "--vpls", 10)[0].mean(), 0.6, seen)
-
-    def write_exr(self, name, pixels):
-        out = test_models.oiio.ImageOutput.create(str(self.folder / name))
-        out.open(str(self.folder / name), test_models.oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "float"))
-        out.write_image(np.ascontiguousarray(pixels))
-        out.close()
 
     def test_the_cornell_box_is_that_of_the_reference_images_in_pbrt_and_mitsuba(self):
         box = json.loads(SCENE.read_text())

@@ -1,5 +1,6 @@
 /* Extension "lumicut.lights/1": virtual lights together with what is known of where they come from. Lights that go out and
- * come in again through it render the same image bit for bit; through lumicut_integrator_set_lights they come in as a host's
+ * come in again through it render the same image bit for bit (but for point and spot lamps with a radius, which come in as
+ * points on their disk); through lumicut_integrator_set_lights they come in as a host's
  * own, of which nothing is known: how near they may come to points then follows how densely all of them lie.
  * lumicut_get_extension("lumicut.lights/1") gives the table. The rules of lumicut.h hold here too. */
 #ifndef LUMICUT_LIGHTS_H
