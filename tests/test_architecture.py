@@ -1,4 +1,5 @@
 """The architecture: includes go down the map of docs/design.md, the library links what it says, one version holds."""
+import json
 import os
 import pathlib
 import re
@@ -65,6 +66,22 @@ def wrong_includes(root):
             elif quote == '"' and not ELSEWHERE.match(name) and ("/" in name or not (path.parent / name).exists()):
                 found.append(f"{file}:{number}: {name} is neither a path from the root nor beside the file")
     return found
+
+
+class Sources(unittest.TestCase):
+    """A file that no target names is neither built nor tested, and nothing says so."""
+    ELSEWHERE = ("tests/fuzz/", "tests/tsan/")  # of other presets
+
+    def test_every_one_is_built(self):
+        commands = BUILD / "compile_commands.json"
+        if not commands.exists():
+            self.skipTest("this build has no compile_commands.json")
+        built = {str(pathlib.Path(entry["file"]).resolve().relative_to(ROOT.resolve())) for entry in json.loads(commands.read_text())
+                 if pathlib.Path(entry["file"]).resolve().is_relative_to(ROOT.resolve())}
+        there = {str(p.relative_to(ROOT)) for top in [*LAYERS, "io", "tools", "tests", "bench"] for p in (ROOT / top).rglob("*.cpp")}
+        if not any(name.startswith("geometry/dnet") for name in built):
+            self.skipTest("built without CGAL")
+        self.assertEqual(sorted(name for name in there - built if not name.startswith(self.ELSEWHERE)), [])
 
 
 class Includes(unittest.TestCase):
