@@ -13,15 +13,14 @@ import resource
 import subprocess
 
 BENCH = os.path.dirname(os.path.abspath(__file__))
-LIGHTCUTS = ["-i", "lightcuts", "-p", "compensate=true", "-p", "importance=true", "--denoise"]
-METHODS = {
-    "Draft": ["-i", "illumination_cut", "--vpls", "10000", "-p", "error=0.05"],
-    "lightcuts as Draft": ["-i", "lightcuts", "--vpls", "10000", "-p", "error=0.05"],
-    "Good in 4 passes": [*LIGHTCUTS, "--vpls", "3000", "-p", "error=0.05", "--passes", "4"],
-    "Good": [*LIGHTCUTS, "--vpls", "3000", "-p", "error=0.05", "--passes", "16"],
-    "Good in 128 passes": [*LIGHTCUTS, "--vpls", "3000", "-p", "error=0.05", "--passes", "128"],
-    "Reference in 16 passes": ["-i", "exhaustive", "--vpls", "4000", "-p", "compensate=true", "--passes", "16"],
-    "the same, denoised": ["-i", "exhaustive", "--vpls", "4000", "-p", "compensate=true", "--passes", "16", "--denoise"],
+METHODS = {  # the layer that is measured, and how it is rendered
+    "Draft": ("radiance", ["--preset", "draft"]),
+    "lightcuts as Draft": ("radiance", ["-i", "lightcuts", "--vpls", "10000", "-p", "error=0.05"]),
+    "Good in 4 passes": ("denoised", ["--preset", "good", "--passes", "4"]),
+    "Good": ("denoised", ["--preset", "good"]),
+    "Final": ("denoised", ["--preset", "final"]),
+    "Reference in 16 passes": ("radiance", ["--preset", "reference", "--passes", "16", "--no-denoise"]),
+    "the same, denoised": ("denoised", ["--preset", "reference", "--passes", "16"]),
 }
 
 
@@ -37,9 +36,8 @@ def main():
     print("|---|---|---|---|---|---|---|---|", flush=True)
     for scene, reference in zip(options.scenes[::2], options.scenes[1::2]):
         rows = []
-        for name, arguments in METHODS.items():
+        for name, (layer, arguments) in METHODS.items():
             image = os.path.join(options.output, "image.exr")
-            layer = "denoised" if "--denoise" in arguments else "radiance"
             before = resource.getrusage(resource.RUSAGE_CHILDREN)
             subprocess.run([options.lumicut, "render", scene, "-q", *arguments, "--size", options.size, "--threads", "1", "--seed", "3",
                             "--layers", layer, "-o", image], check=True)

@@ -6,6 +6,7 @@
 #include "plugin/extensions.h"
 #include "plugin/include/lumicut/lumicut_hits.h"
 #include "plugin/include/lumicut/lumicut_lights.h"
+#include "plugin/include/lumicut/lumicut_presets.h"
 #include "plugin/include/lumicut/lumicut_state.h"
 #include "plugin/objects.h"
 #include "plugin/render_job.h"
@@ -24,6 +25,7 @@ const void* lumicut_get_extension(const char* id) {
   if (id == nullptr) return nullptr;
   if (std::strcmp(id, LUMICUT_HITS_EXTENSION) == 0) return hits_extension();
   if (std::strcmp(id, LUMICUT_LIGHTS_EXTENSION) == 0) return lights_extension();
+  if (std::strcmp(id, LUMICUT_PRESETS_EXTENSION) == 0) return presets_extension();
   if (std::strcmp(id, LUMICUT_STATE_EXTENSION) == 0) return state_extension();
   return nullptr;
 }

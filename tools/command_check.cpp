@@ -20,11 +20,9 @@ using nlohmann::ordered_json;
 
 namespace {
 
-struct Options : RenderSetup {
-  Options() { integrator = kUsualIntegrator; }
+struct Options : FrameSetup {
   std::string scene, size, checkpoint;
-  uint32_t samples = 0, passes = 1;
-  bool groups = false, denoise = false, json = false, no_forecast = false, quiet = false;
+  bool groups = false, json = false, no_forecast = false, quiet = false;
 };
 
 double bytes_of(const io::SceneData& data) {
@@ -36,9 +34,11 @@ double bytes_of(const io::SceneData& data) {
   return bytes;
 }
 
-void check_scene(const Options& o) {
+void check_scene(Options o) {
   const io::Library library;
   const io::Api& api = library.api();
+  apply_preset(api, o, false);
+  const bool denoised = o.denoise.value_or(false);
   ProgressBar bar(o.quiet || o.json);
   io::Handle<lumicut_device> device(api);
   io::Handle<lumicut_scene> scene(api);
@@ -60,13 +60,13 @@ void check_scene(const Options& o) {
   desc.height = size.empty() ? data.height : size[1];
   desc.samples = o.samples > 0 ? o.samples : data.samples;
   desc.filter = data.filter, desc.filter_width = data.filter_width;
-  desc.passes = o.passes;
+  desc.passes = o.passes.value_or(1);
   if (o.groups) desc.flags |= LUMICUT_GROUPS;
-  if (o.denoise) desc.flags |= LUMICUT_DENOISE;
+  if (denoised) desc.flags |= LUMICUT_DENOISE;
   if (!o.checkpoint.empty()) {
     desc.flags |= LUMICUT_CHECKPOINTS;
     check_room_for_checkpoint(api, o.checkpoint, uint64_t{desc.width} * desc.height,
-                              o.groups ? data.light_groups().size() : 0, o.denoise);
+                              o.groups ? data.light_groups().size() : 0, denoised);
   }
   bar.show("acceleration structure", 0, 0);
   commit_scene(api, watcher, scene.get(), o.scene);
@@ -110,16 +110,12 @@ void add_check(CLI::App& app) {
       app.add_subcommand("check", "What a scene holds, what looks wrong in it, what rendering it will cost");
   const auto o = std::make_shared<Options>();
   command->add_option("scene", o->scene, kSceneHelp)->required();
-  add_setup_options(*command, *o);
+  add_frame_options(*command, *o);
   command->add_option("--size", o->size, "WIDTHxHEIGHT in pixels (default: the scene's)");
-  command->add_option("--spp", o->samples, "Samples a pixel (default: the scene's)")->check(CLI::Range(1, 65536));
-  command->add_option("--passes", o->passes, "Passes that are averaged")
-      ->capture_default_str()
-      ->check(CLI::Range(1u, 1u << 30));
+  command->add_option("--passes", o->passes, "Passes that are averaged")->check(CLI::Range(1u, 1u << 30));
   command->add_option("--checkpoint", o->checkpoint,
                       "File that `render` will keep its passes in: is there room for it?");
   command->add_flag("--groups", o->groups, "One image for each light group too");
-  command->add_flag("--denoise", o->denoise, "Denoised too");
   command->add_flag("--no-forecast", o->no_forecast, "Render nothing: no forecast of time and memory");
   command->add_flag("--json", o->json, "Print JSON instead of text");
   command->add_flag("-q,--quiet", o->quiet, "No progress bar");

@@ -31,13 +31,12 @@ using nlohmann::ordered_json;
 
 namespace {
 
-struct Options : RenderSetup {
-  Options() { integrator = kUsualIntegrator; }
+struct Options : FrameSetup {
   std::string scene, output, png, stats, vpl_in, vpl_out, size, crop, layers, heat_maps, checkpoint;
-  uint32_t samples = 0, squares = 0, passes = 0;
-  double seconds = 0, target_error = 0, confidence = 0;
+  uint32_t squares = 0;
+  double confidence = 0;
   int verbosity = 1;
-  bool quiet = false, half = false, resume = false, groups = false, denoise = false, keep_fireflies = false;
+  bool quiet = false, half = false, resume = false, groups = false, keep_fireflies = false;
   float exposure = 0;
 };
 
@@ -103,7 +102,9 @@ class RenderCommand {
 
   void run() {
     check_outputs();
-    const auto channels = choose_channels(api(), o_.layers, o_.denoise);
+    // One image, of lights that are kept or known.
+    apply_preset(api(), o_, o_.squares > 0 || !o_.vpl_in.empty() || !o_.vpl_out.empty());
+    const auto channels = choose_channels(api(), o_.layers, denoised());
     create_device();
     create_integrator();  // a wrong parameter shall not wait for big files
     read_scene();
@@ -180,14 +181,14 @@ class RenderCommand {
     desc_.samples = o_.samples > 0 ? o_.samples : data.samples;
     desc_.filter = data.filter, desc_.filter_width = data.filter_width;
     for (size_t i = 0; i < crop_.size(); ++i) desc_.crop[i] = crop_[i];
-    desc_.passes = o_.passes;
+    desc_.passes = o_.passes.value_or(0);
     desc_.max_seconds = static_cast<float>(o_.seconds);
     desc_.target_error = static_cast<float>(o_.target_error);
     desc_.confidence = static_cast<float>(o_.confidence);
     if (!o_.checkpoint.empty()) desc_.flags |= LUMICUT_CHECKPOINTS;
     if (o_.groups) desc_.flags |= LUMICUT_GROUPS;
-    if (o_.denoise) desc_.flags |= LUMICUT_DENOISE;
-    for (const auto& channel : choose_channels(api(), o_.layers, o_.denoise)) {
+    if (denoised()) desc_.flags |= LUMICUT_DENOISE;
+    for (const auto& channel : choose_channels(api(), o_.layers, denoised())) {
       if (channel.name == "illuminance" && o_.layers != "all") desc_.flags |= LUMICUT_ILLUMINANCE;
       if (of_denoising(channel.name)) desc_.flags |= LUMICUT_DENOISE;
     }
@@ -322,7 +323,7 @@ class RenderCommand {
     stop_if_interrupted();
     check_render(result);
     if (desc_.checkpoint == nullptr || o_.seconds > 0 || o_.target_error > 0 ||
-        status.passes_done <= std::max(1u, o_.passes))
+        status.passes_done <= std::max(1u, desc_.passes))
       return;
     bar_.wipe();
     if (o_.verbosity >= 1)
@@ -339,7 +340,10 @@ class RenderCommand {
                : fmt::format("pass {}{}, {}", status.passes_done + 1, error, phase);
   }
 
-  bool progressive() const { return o_.passes > 1 || o_.seconds > 0 || o_.target_error > 0 || !o_.checkpoint.empty(); }
+  bool denoised() const { return o_.denoise.value_or(false); }
+  bool progressive() const {
+    return desc_.passes > 1 || o_.seconds > 0 || o_.target_error > 0 || !o_.checkpoint.empty();
+  }
 
   // What a killed render goes on from: after each pass (on the disk at most every few seconds), and after the last. Where
   // that fails the image goes on; it is tried again, and the command fails in the end if the last one did.
@@ -430,7 +434,7 @@ class RenderCommand {
     stop_if_interrupted();
     if (!o_.output.empty()) io::write_exr(o_.output, image, o_.half);
     if (!o_.png.empty()) {
-      const auto radiance = read({o_.denoise ? "denoised" : "radiance", 3});
+      const auto radiance = read({denoised() ? "denoised" : "radiance", 3});
       write_exposed_png(o_.png, {radiance.pixels, width, height}, o_.exposure);
     }
     if (!o_.heat_maps.empty())
@@ -471,7 +475,7 @@ class RenderCommand {
     stats["parameters"] = parameters;
   }
 
-  const Options& o_;
+  Options o_;
   io::Library library_;
   ProgressBar bar_;
   io::Handle<lumicut_device> device_{library_.api()};
@@ -497,7 +501,7 @@ void add_render(CLI::App& app) {
   auto* command = app.add_subcommand("render", "Render a scene file");
   const auto o = std::make_shared<Options>();
   command->add_option("scene", o->scene, kSceneHelp)->required();
-  add_setup_options(*command, *o);
+  add_frame_options(*command, *o);
   command->add_option("-o,--output", o->output, "EXR to write");
   add_png_options(*command, o->png, o->exposure);
   command->add_option(
@@ -506,18 +510,17 @@ void add_render(CLI::App& app) {
       "--denoise gives)");
   command->add_flag("--half", o->half, "16 bits a number in the EXR instead of 32");
   command->add_option("--size", o->size, "WIDTHxHEIGHT in pixels (default: the scene's)");
-  command->add_option("--spp", o->samples, "Samples a pixel (default: the scene's)")->check(CLI::Range(1, 65536));
   command->add_option("--crop", o->crop, "x0,y0,x1,y1: the part of the image to render, row 0 on top");
   command
       ->add_option(
           "--squares", o->squares,
           "Render only so many squares of 32 pixels, spread over the image; others are not numbers (EXR alone)")
       ->check(CLI::Range(1, 1 << 24))
-      ->excludes("--crop");
+      ->excludes("--crop")
+      ->excludes("--preset");
   command
       ->add_option("--passes", o->passes,
-                   "Average so many images, each with virtual lights of its own (0: until --seconds or --target-error; "
-                   "else 1)")
+                   "Average so many images, each with virtual lights of its own (0: until --seconds or --target-error)")
       ->check(CLI::Range(0u, 1u << 30));
   command->add_option("--seconds", o->seconds, "Stop after the pass that ends nearest to this")
       ->check(number_in(0, 1e9));
@@ -534,10 +537,6 @@ void add_render(CLI::App& app) {
   command->add_flag(
       "--groups", o->groups,
       "One image for each light group too, as layers radiance.GROUP: `lumicut mix` puts them together anew");
-  command->add_flag(
-      "--denoise", o->denoise,
-      "Filter noise by what the passes tell of it: layers denoised, denoised_error and denoising_*; the PNG "
-      "is denoised. From two passes on");
   command->add_flag("--keep-fireflies", o->keep_fireflies,
                     "With --denoise: rare bright samples stay where they fell, instead of being spread");
   command->add_option("--heat-map", o->heat_maps,
@@ -555,7 +554,8 @@ void add_render(CLI::App& app) {
   command->callback([o] {
     if (o->output.empty() && o->png.empty() && o->stats.empty() && o->vpl_out.empty() && o->heat_maps.empty())
       throw UsageError("render: nothing to write; give -o out.exr, --png, --stats, --heat-map or --vpl-out");
-    if (o->squares > 0 && (o->passes > 1 || o->seconds > 0 || o->target_error > 0 || !o->checkpoint.empty()))
+    if (o->squares > 0 &&
+        (o->passes.value_or(1) > 1 || o->seconds > 0 || o->target_error > 0 || !o->checkpoint.empty()))
       throw UsageError("render: --squares renders one pass");
     catch_interrupts();
     RenderCommand(*o).run();

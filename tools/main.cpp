@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <cstdio>
 #include <new>
 #include <system_error>
@@ -79,7 +80,10 @@ int run(int argc, char** argv, int& output_error) {
     app.parse(argc, argv);
     return kOk;
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kOk : kUsage;  // --help is an error of code 0
+    errno = 0;
+    const int code = app.exit(error) == 0 ? kOk : kUsage;  // --help is an error of code 0
+    if (std::ferror(stdout)) output_error = errno;         // it has more than the stream holds back
+    return code;
   } catch (const SilentExit& error) {
     return error.code();
   } catch (const Interrupted& error) {

@@ -5,10 +5,14 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <span>
+#include <sstream>
 
 #include "io/atomic_file.h"
 #include "io/file_error.h"
 #include "io/scene_file.h"
+#include "plugin/include/lumicut/lumicut_presets.h"
 #include "tools/commands.h"
 #include "tools/interrupt_watcher.h"
 
@@ -29,6 +33,48 @@ void add_setup_options(CLI::App& command, RenderSetup& setup) {
       ->check(CLI::IsMember({"robust", "fast"}))
       ->capture_default_str();
   command.add_flag("--strict", setup.strict, "Take what is only warned of in files as an error");
+}
+
+void add_frame_options(CLI::App& command, FrameSetup& setup) {
+  add_setup_options(command, setup);
+  command
+      .add_option(
+          "--preset", setup.preset,
+          "draft, good, final or reference: integrator, parameters, samples, passes and denoising at once, where "
+          "other options do not say otherwise (default: good, unless -i, -p or --vpls is given)")
+      ->excludes("--integrator");
+  command.add_option("--spp", setup.samples, "Samples a pixel in each pass (default: the preset's, else the scene's)")
+      ->check(CLI::Range(1, 65536));
+  command.add_flag_function(  // a flag that is not given stays open
+      "--denoise,!--no-denoise", [&setup](int64_t count) { setup.denoise = count > 0; },
+      "Filter noise by what the passes tell of it: layers denoised, denoised_error and denoising_*; the PNG is "
+      "denoised. "
+      "From two passes on");
+}
+
+void apply_preset(const io::Api& api, FrameSetup& setup, bool plain) {
+  const auto* table = api::extension<lumicut_presets_extension>(LUMICUT_PRESETS_EXTENSION, api);
+  const bool chosen = plain || !setup.integrator.empty() || !setup.parameters.empty() || setup.vpls;
+  if (setup.preset.empty() && (chosen || table == nullptr)) {
+    if (setup.integrator.empty()) setup.integrator = kUsualIntegrator;
+    return;
+  }
+  if (table == nullptr) throw UsageError("--preset: this library has none");
+  const std::span presets(table->presets, table->count);
+  const auto found = setup.preset.empty() ? presets.begin() + table->usual
+                                          : std::ranges::find(presets, setup.preset, &lumicut_preset::id);
+  if (found == presets.end()) {
+    std::string known;
+    for (const auto& preset : presets) known += (known.empty() ? "" : ", ") + std::string(preset.id);
+    throw UsageError(fmt::format("--preset {}: there are {}", setup.preset, known));
+  }
+  setup.integrator = found->integrator;
+  std::stringstream words(found->parameters);  // what the command line says comes after them
+  setup.parameters.insert(setup.parameters.begin(), std::istream_iterator<std::string>(words), {});
+  if (setup.samples == 0) setup.samples = found->samples;
+  if (!setup.passes && setup.seconds == 0 && setup.target_error == 0)
+    setup.passes = found->passes, setup.target_error = double{found->target_error};
+  if (!setup.denoise) setup.denoise = (found->flags & LUMICUT_DENOISE) != 0 && setup.passes != 1u;
 }
 
 io::SceneData read_scene_file(const std::string& path) {
@@ -71,14 +117,14 @@ void create_integrator(const io::Api& api, const RenderSetup& setup, lumicut_dev
     if (api.integrator_set(integrator.get(), name.c_str(), value.c_str()) != LUMICUT_OK)
       throw UsageError(api.last_error());
   };
-  if (setup.vpls) set("vpls", std::to_string(*setup.vpls));
-  if (setup.seed) set("seed", std::to_string(*setup.seed));
   for (const auto& parameter : setup.parameters) {
     const size_t equals = parameter.find('=');
     if (equals == std::string::npos || equals == 0)
       throw UsageError(fmt::format("-p {}: must be name=value", parameter));
     set(parameter.substr(0, equals), parameter.substr(equals + 1));
   }
+  if (setup.vpls) set("vpls", std::to_string(*setup.vpls));
+  if (setup.seed) set("seed", std::to_string(*setup.seed));
 }
 
 lumicut_integrator_info integrator_info(const io::Api& api, const std::string& id) {

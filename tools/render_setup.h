@@ -35,6 +35,20 @@ struct RenderSetup {
 // -i, -p, --vpls, --seed, --threads, --accel, --builder, --rays, --strict.
 void add_setup_options(CLI::App& command, RenderSetup& setup);
 
+// Of a whole frame. What the command line leaves open, a preset fills.
+struct FrameSetup : RenderSetup {
+  std::string preset;
+  uint32_t samples = 0;            // a pixel; 0: the scene's
+  std::optional<uint32_t> passes;  // 0: until the other two stop them
+  double seconds = 0, target_error = 0;
+  std::optional<bool> denoise;
+};
+// Those above, --preset, --spp and --denoise.
+void add_frame_options(CLI::App& command, FrameSetup& setup);
+// Fills what is open by --preset; without it, by the usual one where neither an integrator nor its parameters were chosen
+// and the frame is not `plain`, else by one pass of kUsualIntegrator. Throws UsageError where there is no such preset.
+void apply_preset(const io::Api& api, FrameSetup& setup, bool plain);
+
 // io::read_scene_file, which Ctrl-C ends at once.
 io::SceneData read_scene_file(const std::string& path);
 

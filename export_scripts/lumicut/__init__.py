@@ -30,6 +30,11 @@ def integrators(path=""):
     return load(path).integrators()
 
 
+def presets(path=""):
+    """{id: PresetRow}, from the quickest on: named qualities for whole frames, for render()'s `preset`."""
+    return {row.id: row for row in load(path).presets()[0]}
+
+
 def look_at(eye, target, up=(0, 0, 1), fov_y=math.radians(50), **fields):
     """A camera at `eye` that looks at `target`. `fov_y` in radians; other fields as in lumicut_camera."""
     def unit(v):
@@ -49,11 +54,19 @@ def look_at(eye, target, up=(0, 0, 1), fov_y=math.radians(50), **fields):
 
 
 def render(scene, integrator="lightcuts", width=320, height=240, samples=1, channels="radiance", progress=None, passes=1, max_seconds=0.0,
-           target_error=0.0, flags=0, **parameters):
+           target_error=0.0, flags=0, preset=None, **parameters):
     """An image of a committed scene, (height, width, components) float32, top row first; with a list of channels a dictionary
     of them. `integrator`: a name, or an Integrator that is kept between calls. `parameters` are the method's (`vpls`, `error`,
-    `seed`, ...). progress(share, phase) is called about ten times a second; where it returns False the render is cancelled,
+    `seed`, ...). `preset`: a name of presets(), in place of integrator, samples, passes and target_error; parameters change it.
+    progress(share, phase) is called about ten times a second; where it returns False the render is cancelled,
     which raises Cancelled, as an interrupt does."""
+    if preset is not None:
+        rows = {row.id: row for row in scene.device.library.presets()[0]}
+        if preset not in rows:
+            raise ValueError(f"preset {preset!r}: there are {', '.join(rows)}")
+        row = rows[preset]
+        integrator, samples, passes, target_error, flags = row.integrator, row.samples, row.passes, row.target_error, flags | row.flags
+        parameters = row.parameters | parameters
     method = Integrator(scene.device, integrator) if isinstance(integrator, str) else integrator
     for name, value in parameters.items():
         method.set(name, str(value).lower() if isinstance(value, bool) else value)

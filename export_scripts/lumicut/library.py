@@ -261,6 +261,19 @@ class HitsExtension(Structure):
                 ("trace", ctypes.CFUNCTYPE(c_int32, c_void_p, POINTER(RenderDesc), c_uint64, c_uint64, POINTER(Tile), c_void_p))]
 
 
+# ---- lumicut_presets.h
+
+
+class PresetInfo(Structure):
+    _fields_ = [("id", c_char_p), ("label", c_char_p), ("description", c_char_p), ("integrator", c_char_p), ("parameters", c_char_p),
+                ("samples", c_uint32), ("passes", c_uint32), ("flags", c_uint32), ("target_error", c_float)]
+
+
+class PresetsExtension(Structure):
+    _fields_ = [("struct_size", c_uint32), ("count", c_uint32), ("presets", POINTER(PresetInfo)), ("usual", c_uint32),
+                ("reserved", c_uint32)]
+
+
 # The same records as NumPy has them.
 VPL, VPL_ORIGIN, POINT_TO_SHADE, RAY, RAYHIT, FIRST_HIT = map(np.dtype, (Vpl, VplOrigin, Point, Ray, Rayhit, FirstHit))
 
@@ -374,6 +387,23 @@ class IntegratorRow(typing.NamedTuple):
     presets: dict
 
 
+class PresetRow(typing.NamedTuple):
+    """All texts str. `parameters`: {name: text} of the integrator; the rest as in lumicut_render_desc."""
+    id: str
+    label: str
+    description: str
+    integrator: str
+    parameters: dict
+    samples: int
+    passes: int
+    target_error: float
+    flags: int
+
+
+def _pairs(text):
+    return dict(pair.split("=", 1) for pair in (text or b"").decode().split())
+
+
 class Library:
     """The loaded library and its tables. Raises Error where a call fails, Cancelled where it was cancelled."""
 
@@ -399,6 +429,16 @@ class Library:
         text = (self.dll.lumicut_last_error() or b"").decode(errors="replace")
         raise (Cancelled if code == CANCELLED else Error)(code, text or f"error {code}")
 
+    def presets(self):
+        """([PresetRow] from the quickest on, id of the one to take when nobody chose); ([], None): the library has none."""
+        table = self.dll.lumicut_get_extension(b"lumicut.presets/1")
+        if not table:
+            return [], None
+        table = ctypes.cast(table, POINTER(PresetsExtension))[0]
+        rows = [PresetRow(p.id.decode(), p.label.decode(), p.description.decode(), p.integrator.decode(), _pairs(p.parameters),
+                          p.samples, p.passes, p.target_error, p.flags) for p in table.presets[:table.count]]
+        return rows, rows[table.usual].id
+
     def integrators(self):
         """[IntegratorRow] as the library declares them."""
         result = []
@@ -413,8 +453,7 @@ class Library:
                 parameters.append({name: getattr(p, name).decode() for name in
                                    ("id", "label", "description", "unit", "choices", "default_text")} |
                                   {"type": p.type, "minimum": p.minimum, "maximum": p.maximum})
-            presets = {name: dict(pair.split("=", 1) for pair in (getattr(info, name) or b"").decode().split())
-                       for name in QUALITIES}
+            presets = {name: _pairs(getattr(info, name)) for name in QUALITIES}
             result.append(IntegratorRow(info.id.decode(), info.label.decode(), info.description.decode(),
                                         info.source.decode(), parameters, info.traits or ANY_TRAIT, presets))
 

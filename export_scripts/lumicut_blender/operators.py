@@ -18,7 +18,7 @@ class LUMICUT_OT_preset(bpy.types.Operator):
     bl_idname = "lumicut.preset"
     bl_label = "Lumicut Preset"
     bl_options = {"REGISTER", "UNDO"}
-    preset: EnumProperty(name="Preset", items=[(key, row[0], row[1]) for key, row in properties.PRESETS.items()])  # noqa: F821
+    preset: EnumProperty(name="Preset", items=lambda values, context: [row[:3] for row in properties.tables.presets.values()])  # noqa: F821
 
     @classmethod
     def poll(cls, context):
@@ -26,7 +26,7 @@ class LUMICUT_OT_preset(bpy.types.Operator):
 
     @classmethod
     def description(cls, context, values):
-        return properties.PRESETS[values.preset][1]
+        return properties.tables.presets[values.preset].description
 
     def execute(self, context):
         properties.apply_preset(context.scene.lumicut, self.preset)

@@ -106,10 +106,10 @@ class LUMICUT_PT_sampling_presets(PresetPanel, bpy.types.Panel):
         layout.emboss = "PULLDOWN_MENU"
         if properties.tables.integrators:
             active, column = properties.active_preset(context.scene.lumicut), layout.column(align=True)
-            for key, preset in properties.PRESETS.items():
+            for key, preset in properties.tables.presets.items():
                 row = column.row(align=True)
                 row.alignment = "LEFT"
-                row.operator("lumicut.preset", text=preset[0], icon="CHECKMARK" if key == active else "BLANK1").preset = key
+                row.operator("lumicut.preset", text=preset.label, icon="CHECKMARK" if key == active else "BLANK1").preset = key
             layout.separator()
         if bpy.utils.preset_paths(self.preset_subdir):
             PresetPanel.draw(self, context)
@@ -136,8 +136,8 @@ class LUMICUT_PT_sampling(Panel, bpy.types.Panel):
             return
         active = properties.active_preset(context.scene.lumicut)
         row = layout.row(align=True)
-        for key, preset in properties.PRESETS.items():
-            row.operator("lumicut.preset", text=preset[0], depress=key == active).preset = key
+        for key, preset in properties.tables.presets.items():
+            row.operator("lumicut.preset", text=preset.label, depress=key == active).preset = key
         if active is None:
             layout.label(text="Custom: none of these", icon="DOT")
 

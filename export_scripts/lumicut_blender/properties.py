@@ -32,16 +32,7 @@ GROUP_PASS = "Combined_"  # of a light group, as Cycles names it
 
 STOPS = ("passes", "max_seconds", "target_error", "confidence")  # of lumicut_render_desc, under the same names
 
-PRESETS = {
-    # name, a quality of the library's: (label, tooltip, own settings, integrator, which the library suggests parameters for)
-    "draft": ("Draft", "For a first look: one image of few lights with wide bounds, not denoised. Corners and gloss are too dark",
-              {"samples": 1, "passes": 1}, "illumination_cut"),
-    "good": ("Good", "For most images, and what a new scene has: the mean of 16 iterations of 3,000 lights each, with what the clamp takes brought back, denoised",
-             {"samples": 1, "passes": 16}, "lightcuts"),
-    "reference": ("Reference", "To compare with path tracers: 256 iterations that each sum all of 4,000 lights anew, with what the clamp takes brought back. Slow",
-                  {"samples": 1, "passes": 256}, "exhaustive"),
-}
-DEFAULT_PRESET = "good"
+USUAL_ERROR = 0.02  # when the noise threshold is switched on
 RENDER_SETTINGS = ("samples", *STOPS, "denoise", "firefly_filter")  # what presets set beside the integrator and its parameters
 SMALL_WORDS = {"a", "an", "and", "are", "as", "at", "by", "for", "in", "of", "or", "the", "to", "with"}
 
@@ -97,8 +88,11 @@ def value_of(parameter, text):
 class Tables:
     """The parameter tables, parted into what nearly all integrators share and what each has alone."""
 
-    def __init__(self, integrators):
+    def __init__(self, integrators, presets=(), usual=None):
+        """What library.Library's integrators() and presets() give."""
         self.integrators = integrators
+        self.presets = {row.id: row for row in presets}
+        self.usual = self.presets.get(usual)
         self.of = {row.id: row.parameters for row in integrators}
         self.ids = {identifier: {p["id"] for p in parameters} for identifier, parameters in self.of.items()}
         first = integrators[0].parameters if integrators else []
@@ -155,13 +149,17 @@ def common_parameters_of(settings, integrator):
 def preset_values(name):
     """{(group or None for the scene's own, property): value} of all that a preset sets: but for the seed, what an image
     depends on."""
-    _, _, own, wanted = PRESETS[name]
-    values = {(None, key): own.get(key, DEFAULTS[key]) for key in RENDER_SETTINGS}
-    integrator, suggested = tables.suggested(name, wanted)
-    values[None, "integrator"] = integrator
-    for group, parameters in ((COMMON, tables.common_of(integrator)), (integrator, tables.own_of(integrator))):
-        values |= {(group, p["id"]): value_of(p, suggested.get(p["id"], p["default_text"])) for p in parameters if p["id"] != "seed"}
+    preset = tables.presets[name]
+    values = {(None, key): value for key, value in of_preset(preset).items()}
+    values[None, "integrator"] = preset.integrator
+    for group, parameters in ((COMMON, tables.common_of(preset.integrator)), (preset.integrator, tables.own_of(preset.integrator))):
+        values |= {(group, p["id"]): value_of(p, preset.parameters.get(p["id"], p["default_text"])) for p in parameters if p["id"] != "seed"}
     return values
+
+
+def of_preset(preset):
+    """{name: value} of RENDER_SETTINGS. A frame of one iteration has nothing to denoise by, so that the switch may stay on."""
+    return DEFAULTS | {"samples": preset.samples, "passes": preset.passes, "target_error": preset.target_error}
 
 
 def _owner(settings, group):
@@ -178,7 +176,7 @@ def active_preset(settings):
     def same(a, b):
         return math.isclose(a, b, rel_tol=1e-5) if isinstance(b, float) else a == b
 
-    for name in PRESETS:
+    for name in tables.presets:
         if all(same(getattr(_owner(settings, group), key), value) for (group, key), value in preset_values(name).items()):
             return name
     return None
@@ -200,15 +198,14 @@ def _set_viewport_threshold(settings, on):
     settings.viewport_target_error = USUAL_ERROR if on else 0.0
 
 
-USUAL_ERROR = 0.02  # when the threshold is switched on
 DEFAULTS = {"samples": 1, "passes": 1, "max_seconds": 0.0, "target_error": 0.0, "confidence": 0.95, "denoise": True, "firefly_filter": True}
 
 
 def register():
     global tables
     lib = runtime.loaded()
-    tables = Tables(lib.integrators() if lib is not None else [])
-    untouched = DEFAULTS | PRESETS[DEFAULT_PRESET][2]
+    tables = Tables(lib.integrators(), *lib.presets()) if lib is not None else Tables([])
+    untouched = of_preset(tables.usual) if tables.usual else DEFAULTS
     annotations = {
         "version": IntProperty(description="Of what the file's settings mean, see migration.py", default=0, options={"HIDDEN"}),
         "samples": IntProperty(name="Samples", description="Samples a pixel in each iteration, for edges, texture and depth of field. Leave it at 1 where there are many iterations",
@@ -248,14 +245,14 @@ def register():
         "threads": IntProperty(name="Threads", description="Threads that render. 0: as many as the machine has. Leave one to the interface where there are few",
                                default=0, min=0, max=1024),
     }
-    preset, suggested = tables.suggested(DEFAULT_PRESET, PRESETS[DEFAULT_PRESET][3])
+    integrator, suggested = (tables.usual.integrator, tables.usual.parameters) if tables.usual else tables.suggested("good")
     if tables.integrators:
         annotations["integrator"] = EnumProperty(
             name="Integrator", description="How the virtual lights are summed",
             items=[(row.id, title_case(row.label), f"{row.description}. {row.source}") for row in tables.integrators],
-            default=preset)
+            default=integrator)
     for group, parameters in tables.groups():
-        defaults = suggested if group in {COMMON, preset} else {}
+        defaults = suggested if group in {COMMON, integrator} else {}
         cls = type(f"LumicutParameters_{group}", (bpy.types.PropertyGroup,),
                    {"__annotations__": {p["id"]: property_of(p, defaults.get(p["id"])) for p in parameters}})
         bpy.utils.register_class(cls)

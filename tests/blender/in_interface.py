@@ -201,7 +201,7 @@ class Presets(unittest.TestCase):
 
     def test_the_active_preset_is_shown_and_none_once_something_differs(self):
         settings = self.fresh()
-        for name in properties.PRESETS:
+        for name in properties.tables.presets:
             bpy.ops.lumicut.preset(preset=name)
             self.assertEqual(properties.active_preset(settings), name)
         settings.common.seed = 7  # another picture of the same kind

@@ -109,6 +109,15 @@ class Package(unittest.TestCase):
             np.testing.assert_array_equal(images[0][name], images[1][name])
         self.assertGreater(images[0]["radiance"].mean(), 0.01)
 
+    def test_a_preset_is_what_it_stands_for(self):
+        scene, preset = room(self.device), lumicut.presets()["good"]
+        image = lumicut.render(scene, width=16, height=12, preset="good", vpls=20)
+        same = lumicut.render(scene, preset.integrator, 16, 12, preset.samples, passes=preset.passes, flags=preset.flags,
+                              **(preset.parameters | {"vpls": 20}))
+        np.testing.assert_array_equal(image, same)
+        with self.assertRaisesRegex(ValueError, "best.*draft, good, final, reference"):
+            lumicut.render(scene, preset="best")
+
     def test_progress_may_cancel(self):
         scene = room(self.device)
         told = []

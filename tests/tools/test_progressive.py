@@ -156,6 +156,36 @@ class Progressive(Compared):
         self.assertEqual(self.files(), [])
 
 
+class Presets(Compared):
+    def stats(self, *arguments):
+        path = self.folder / "stats.json"
+        self.assert_ends(lumicut("render", SCENE, "--size", "16x12", "-q", "--stats", path, *arguments), OK)
+        values = json.loads(path.read_text())
+        return values["integrator"], values["samples"], values["values"].get("passes", 1), values["parameters"]
+
+    def test_good_is_what_nobody_chose(self):
+        image, named = self.folder / "image.exr", self.folder / "named.exr"
+        self.assertEqual(self.stats("-o", image)[:3], ("lightcuts", 1, 16))
+        self.assertEqual(self.stats("--preset", "good", "-o", named)[3]["compensate"], "1")
+        self.assertEqual(self.difference(image, named, "--layer", "denoised")["rmse"], 0)
+
+    def test_other_options_change_a_preset(self):
+        integrator, samples, passes, parameters = self.stats("--preset", "reference", "--passes", "2", "--spp", "3", "--vpls", "20")
+        self.assertEqual((integrator, samples, passes, parameters["vpls"], parameters["compensate"]), ("exhaustive", 3, 2, "20", "1"))
+        self.assertEqual(self.stats("--seconds", "0.001")[2], 1)
+        self.assertEqual(self.stats("-p", "error=0.1")[2:], self.stats("-i", "lightcuts", "-p", "error=0.1")[2:])
+        self.assertEqual(self.stats("-p", "error=0.1", "--preset", "draft")[0], "illumination_cut")
+        image = self.folder / "plain.exr"
+        self.stats("--no-denoise", "-o", image)
+        self.assert_ends(lumicut("compare", image, image, "--layer", "denoised"), BAD_FILE, "denoised")
+
+    def test_wrong_ones_are_named(self):
+        for arguments, text in ((["--preset", "best"], "draft, good, final, reference"), (["--preset", "good", "-i", "wspd"], "--integrator"),
+                                (["--preset", "good", "--squares", "2"], "--preset")):
+            self.assert_ends(lumicut("render", SCENE, "-o", self.folder / "a.exr", *arguments), USAGE, text)
+        self.assertEqual(self.files(), [])
+
+
 class Mix(Compared):
     SCENE = {
         "camera": {"eye": [0, 0, 4], "at": [0, 0, 0], "fov_y": 40},
