@@ -53,8 +53,7 @@ Command add_independent_set(CLI::App& app) {
   command->add_option("--start", a->start, "CSV of indices of disks that do not touch (none: small ones first)");
   command->add_option("--exchange", a->exchange, "Most disks that one step takes in, for one fewer")
       ->check(CLI::Range(2, 4));
-  command->add_option("--picture", a->picture, "Picture, .svg or .png: the chosen disks are red");
-  command->add_option("--size", a->size, "Its size in pixels")->check(CLI::Range(50, 10000));
+  add_picture(*command, a->picture, a->size, "Picture, .svg or .png: the chosen disks are red");
   return [a] { return run(*a); };
 }
 

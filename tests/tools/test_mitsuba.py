@@ -1,4 +1,5 @@
 """Mitsuba 3 scenes, which the test writes: against formulas, and against the same scene as JSON."""
+import json
 import math
 import os
 import struct
@@ -9,7 +10,7 @@ import numpy as np
 
 import test_gltf
 import test_models
-from cli import BAD_FILE, lumicut
+from cli import BAD_FILE, OK, lumicut
 from test_pbrt import SceneFiles
 
 
