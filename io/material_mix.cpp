@@ -22,7 +22,7 @@ bool is_hole(const lumicut_material& m) { return m.opacity > 0 && m.opacity <= k
 }  // namespace
 
 PaintRef SceneBuilder::colour_of(const float* factor, int32_t texture) const {
-  const PaintRef constant = constant_paint(Vec{factor[0], factor[1], factor[2]});
+  PaintRef constant = constant_paint(Vec{factor[0], factor[1], factor[2]});
   if (texture == 0) return constant;
   const bool alone = factor[0] == 1 && factor[1] == 1 && factor[2] == 1;
   return alone ? made_of_.at(texture) : product(made_of_.at(texture), constant);

@@ -273,15 +273,28 @@ int32_t SceneBuilder::compile(const PaintRef& paint, Program& program) {
                      kFlooredModulo = 25;
   const auto place = [&] {
     const auto& m = paint->place.to.m;
-    const int32_t from = step(paint->place.of_point ? LUMICUT_OP_POSITION : LUMICUT_OP_UV, 0, {});
-    if (m == Affine{}.m) return from;
-    if (!paint->place.of_point && m[1] == 0 && m[4] == 0)
+    const TexturePlace::Kind kind = paint->place.kind;
+    const int32_t from = step(kind == TexturePlace::Kind::uv ? LUMICUT_OP_UV : LUMICUT_OP_POSITION, 0, {});
+    if (m == Affine{}.m && kind <= TexturePlace::Kind::point) return from;
+    if (kind == TexturePlace::Kind::uv && m[1] == 0 && m[4] == 0)
       return step(LUMICUT_OP_VECTOR, kMultiplyAdd, {from, constant(m[0], m[5], 1), constant(m[3], m[7], 0)});
     const auto row = static_cast<uint32_t>(program.table.size());
     for (const double x : m) program.table.push_back(static_cast<float>(x));
     const int32_t out = step(LUMICUT_OP_TRANSFORM, 0, {from}, row);
     program.instructions.back().count = 12;
-    return out;
+    if (kind <= TexturePlace::Kind::point) return out;
+    const auto part = [&](int32_t of, uint32_t which) { return step(LUMICUT_OP_SEPARATE, which, {of}); };
+    constexpr uint32_t kFraction = 23, kArcCosine = 33, kArcTangent2 = 35, kNormalize = 14;
+    const int32_t turn = step(LUMICUT_OP_MATH, kArcTangent2, {part(out, 1), part(out, 0)});
+    const double per_turn = 1 / (2 * kPi), half = kind == TexturePlace::Kind::cylinder ? 0.5 : 0;
+    const int32_t around =
+        step(LUMICUT_OP_MATH, kMultiplyAdd, {turn, constant(per_turn, per_turn, per_turn), constant(half, half, half)});
+    if (kind == TexturePlace::Kind::cylinder)
+      return step(LUMICUT_OP_COMBINE, 0, {around, part(out, 2), constant(0, 0, 0)});
+    const int32_t z = part(step(LUMICUT_OP_VECTOR, kNormalize, {out}), 2);
+    const int32_t down =
+        step(LUMICUT_OP_MATH, kMultiply, {step(LUMICUT_OP_MATH, kArcCosine, {z}), constant(1 / kPi, 1 / kPi, 1 / kPi)});
+    return step(LUMICUT_OP_COMBINE, 0, {down, step(LUMICUT_OP_MATH, kFraction, {around}), constant(0, 0, 0)});
   };
   switch (paint->kind) {
     case Paint::Kind::constant:
@@ -290,13 +303,21 @@ int32_t SceneBuilder::compile(const PaintRef& paint, Program& program) {
       return step(LUMICUT_OP_IMAGE, paint->mode, {place()}, static_cast<uint32_t>(paint->texture));
     case Paint::Kind::axis:
       return step(LUMICUT_OP_SEPARATE, paint->mode, {place()});
+    case Paint::Kind::along: {
+      constexpr uint32_t kDot = 10, kAbsolute = 9;
+      const int32_t normal = step(LUMICUT_OP_NORMAL, 1, {});
+      const int32_t cosine =
+          step(LUMICUT_OP_VECTOR, kDot, {normal, constant(paint->value[0], paint->value[1], paint->value[2])});
+      return step(LUMICUT_OP_MATH, kAbsolute, {cosine});
+    }
     case Paint::Kind::behind:
       return step(LUMICUT_OP_BEHIND, 0, {});
     case Paint::Kind::checker: {
       const int32_t cell = step(LUMICUT_OP_VECTOR, kFloor, {place()});
       int32_t sum =
           step(LUMICUT_OP_MATH, kAdd, {step(LUMICUT_OP_SEPARATE, 0, {cell}), step(LUMICUT_OP_SEPARATE, 1, {cell})});
-      if (paint->place.of_point) sum = step(LUMICUT_OP_MATH, kAdd, {sum, step(LUMICUT_OP_SEPARATE, 2, {cell})});
+      if (paint->place.kind == TexturePlace::Kind::point)
+        sum = step(LUMICUT_OP_MATH, kAdd, {sum, step(LUMICUT_OP_SEPARATE, 2, {cell})});
       const int32_t odd = step(LUMICUT_OP_MATH, kFlooredModulo, {sum, constant(2, 2, 2)});
       const int32_t a = compile(paint->a, program), b = compile(paint->b, program);
       return step(LUMICUT_OP_MIX, 0, {odd, a, b});
@@ -324,7 +345,7 @@ int32_t SceneBuilder::compile(const PaintRef& paint, Program& program) {
 }
 
 int32_t SceneBuilder::texture_of(const PaintRef& paint) {
-  if (paint->kind == Paint::Kind::image && paint->mode == 0 && !paint->place.of_point &&
+  if (paint->kind == Paint::Kind::image && paint->mode == 0 && paint->place.kind == TexturePlace::Kind::uv &&
       paint->place.to.m == Affine{}.m) {
     made_of_[paint->texture] = paint;
     return paint->texture;

@@ -45,19 +45,21 @@ Geometry disk_geometry(double height, double radius, double inner, double sweep)
 // About the z axis, outwards, without lids.
 Geometry cylinder_geometry(double radius, double z0, double z1, double sweep);
 
-// Where on a texture a place of a surface is: `to` of (u, v, 0), or of the point in the world.
+// Where on a texture a place of a surface is: `to` of (u, v, 0), or of the point in the world; then, on a sphere, by the
+// angles to z and around it, on a cylinder by the angle around z and z. Angles become 0 to 1.
 struct TexturePlace {
+  enum class Kind { uv, point, sphere, cylinder };
   Affine to;
-  bool of_point = false;
+  Kind kind = Kind::uv;
 };
 
 // What a material's value is made of: a constant, or what is computed at the hit.
 struct Paint;
 using PaintRef = std::shared_ptr<const Paint>;
 struct Paint {
-  enum class Kind { constant, image, checker, axis, behind, product, mix, invert, power };
+  enum class Kind { constant, image, checker, axis, along, behind, product, mix, invert, power };
   Kind kind = Kind::constant;
-  Vec value{0, 0, 0};    // constant; power: the exponent in [0]
+  Vec value{0, 0, 0};    // constant; power: the exponent in [0]; along: a direction, whose cosine to the normal it is
   int32_t texture = 0;   // image
   uint32_t mode = 0;     // image: as LUMICUT_OP_IMAGE has it; axis: which coordinate
   TexturePlace place;    // image, checker (squares, or cubes), axis

@@ -39,6 +39,7 @@ class Reader {
     build_.scene.width = 768, build_.scene.height = 576;
     grey_ = build_.add_material("no bsdf", default_material());
     read_file(build_.path());
+    for (const Node& node : scene_) element(node);
     return build_.finish(has_camera_);
   }
 
@@ -64,11 +65,11 @@ class Reader {
     if (std::string(root.name()) != "scene")
       throw FileError(path, fmt::format("its first element is <{}>, not <scene>", shown(root.name())));
     upgrade_mitsuba(root);
-    for (const Node& child : root.children()) element(child);
+    for (const Node& child : root.children()) gather(child);
     --depth_;
   }
-
-  void element(const Node& node) {
+  // Names first: what refers to them may stand before them.
+  void gather(const Node& node) {
     const std::string name = node.name();
     if (node.type() != pugi::node_element) return;
     if (name == "default") {
@@ -82,22 +83,35 @@ class Reader {
       const auto known = ids_.find(text(node, "id"));
       if (known == ids_.end()) fail(node, "there is no such id");
       ids_[text(node, "as")] = known->second;
-    } else if (name == "integrator") {
+    } else {
+      remember(node);
+      scene_.push_back(node);
+    }
+  }
+  // Its id and those of what it holds.
+  void remember(const Node& node) {
+    if (++depth_ > kDeepest) fail(node, "elements lie in each other without end");
+    if (node.attribute("id") && std::string(node.name()) != "ref") ids_[text(node, "id")] = node;
+    for (const Node& c : node.children())
+      if (c.type() == pugi::node_element) remember(c);
+    --depth_;
+  }
+
+  void element(const Node& node) {
+    const std::string name = node.name();
+    if (name == "integrator") {
       integrator(node);
     } else if (name == "path") {
       build_.leave_out("<path>: files are searched for beside the scene");
     } else if (name == "medium") {
       build_.leave_out("media");
-    } else if (name == "sampler") {
-    } else if (name == "bsdf" || name == "texture" || name == "spectrum") {
-      remember(node);
+    } else if (name == "sampler" || name == "bsdf" || name == "texture" || name == "spectrum") {
+      // read where they are used
     } else if (name == "emitter") {
-      remember(node);
       emitter(node);
     } else if (name == "sensor") {
       sensor(node);
     } else if (name == "shape") {
-      remember(node);
       if (text(node, "type") != "shapegroup") shape(node, {}, {});
     } else {
       build_.leave_out(fmt::format("<{}>", name));
@@ -109,9 +123,6 @@ class Reader {
     if (truth(node, "hide_emitters", false)) build_.emitters_seen = false;
     for (const Node& c : node.children("integrator")) integrator(c);
     --depth_;
-  }
-  void remember(const Node& node) {
-    if (node.attribute("id")) ids_[text(node, "id")] = node;
   }
 
   // ---- Values
@@ -180,7 +191,7 @@ class Reader {
   }
   Node referred(const Node& ref) const {
     const auto known = ids_.find(text(ref, "id"));
-    if (known == ids_.end()) fail(ref, "there is no such id above it");
+    if (known == ids_.end()) fail(ref, "there is no such id");
     return known->second;
   }
   double number(const Node& node, const char* name, double otherwise) const {
@@ -749,7 +760,8 @@ class Reader {
       c.focus_distance = static_cast<float>(number(node, "focus_distance", 1));
     }
     has_camera_ = true;
-    tell_unread(node, {"to_world", "shutter_open", "shutter_close", "focal_length", "fov", "fov_axis"});
+    tell_unread(node,
+                {"to_world", "shutter_open", "shutter_close", "focal_length", "fov", "fov_axis", "focus_distance"});
   }
   double field_of_view(const Node& node, double aspect) const {
     std::string axis = word(node, "fov_axis", "x");
@@ -841,6 +853,7 @@ class Reader {
   std::list<pugi::xml_document> documents_;
   std::map<std::string, std::string> defaults_;
   std::map<std::string, Node> ids_;
+  std::vector<Node> scene_;  // in the order of the files
   std::map<std::pair<size_t, bool>, PaintRef> paints_;
   std::map<size_t, uint32_t> materials_;
   std::map<std::string, std::vector<Part>> groups_;

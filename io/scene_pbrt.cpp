@@ -436,9 +436,10 @@ class Reader {
     } else if (kind == "mix") {
       result = build_.mixed(part("tex1", 0), part("tex2", 1), paint(p, "amount", 0.5, true));
     } else if (kind == "directionmix") {
-      build_.approximate(fmt::format("the texture \"{}\", a mix by direction, is a mix in equal parts", name));
-      p.ignore("dir");
-      result = build_.mixed(part("tex1", 0), part("tex2", 1), constant_paint(0.5));
+      Paint along;
+      along.kind = Paint::Kind::along;
+      along.value = unit(state_.ctm.vector(p.vector("dir", {0, 1, 0})));
+      result = build_.mixed(part("tex2", 1), part("tex1", 0), build_.made(along));
     } else if (kind == "bilerp") {
       const auto axis = [&](uint32_t which) {
         Paint coordinate;
@@ -450,7 +451,8 @@ class Reader {
                             build_.mixed(part("v10", 0), part("v11", 1), t), axis(0));
     } else if (kind == "checkerboard") {
       out.kind = Paint::Kind::checker, out.a = part("tex1", 1), out.b = part("tex2", 0);
-      out.place = p.number("dimension", 2) == 3 ? TexturePlace{inverse_place(), true} : place_of(p, kind);
+      out.place =
+          p.number("dimension", 2) == 3 ? TexturePlace{inverse_place(), TexturePlace::Kind::point} : place_of(p, kind);
       result = build_.made(out);
     } else if (kind == "imagemap") {
       const std::string encoding = p.word("encoding", "sRGB"), wrap = p.word("wrap", "repeat");
@@ -496,12 +498,17 @@ class Reader {
     if (mapping == "planar") {
       const Affine back = inverse_place();
       const Vec axes[2] = {p.vector("v1", {1, 0, 0}), p.vector("v2", {0, 1, 0})};
-      out.of_point = true;
+      out.kind = TexturePlace::Kind::point;
       for (size_t r = 0; r < 2; ++r) {
         for (size_t c = 0; c < 3; ++c) out.to.m[4 * r + c] = dot(axes[r], back.column(c));
         out.to.m[4 * r + 3] = dot(axes[r], back.column(3)) + (r == 0 ? du : dv);
       }
       out.to.m[8] = out.to.m[9] = out.to.m[10] = out.to.m[11] = 0;
+      return out;
+    }
+    if (mapping == "spherical" || mapping == "cylindrical") {
+      out.kind = mapping == "spherical" ? TexturePlace::Kind::sphere : TexturePlace::Kind::cylinder;
+      out.to = inverse_place();
       return out;
     }
     if (mapping != "uv") build_.approximate(fmt::format("{}s mapped \"{}\" are taken as by uv", kind, mapping));

@@ -77,10 +77,7 @@ device = ctypes.c_void_p(embree.rtcNewDevice(b"threads=2"))
 assert device
 sys.path.insert(0, host)
 import lumicut
-import os
-os.environ["LUMICUT_LIBRARY"] = library
-loaded = lumicut.Library()
-dev = lumicut.Device(loaded, 2)
+dev = lumicut.Device(2, library)
 with lumicut.Scene(dev) as scene, lumicut.Integrator(dev, "lightcuts") as method:
     scene.set_materials([lumicut.Material(diffuse=(0.5, 0.5, 0.5))])
     scene.add_mesh([[-1, -1, -3], [1, -1, -3], [1, 1, -3], [-1, 1, -3]], [[0, 1, 2], [0, 2, 3]])

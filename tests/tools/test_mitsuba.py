@@ -230,6 +230,16 @@ class Mitsuba(SceneFiles):
             (self.folder / "two.serialized").write_bytes(broken)
             self.assert_ends(lumicut("render", self.write("mesh.xml", scene(shape(7 if broken is whole else 1))), "-o", self.folder / "x.exr"), BAD_FILE, text)
 
+    def test_what_is_named_may_stand_before_its_name_and_lie_inside_of_others(self):
+        self.write("shape.xml", scene('<shape type="rectangle"><ref id="above"/></shape>'))
+        camera_above = camera((0, 0, 3), (0, 0, 0), 20, (4, 4))
+        path = self.write("first.xml", scene(
+            '<include filename="shape.xml"/>', camera_above, '<emitter type="constant"/>', '<bsdf type="twosided" id="above"><ref id="within"/></bsdf>',
+            '<shape type="sphere"><point name="center" value="9, 9, 9"/><bsdf type="diffuse" id="within">' + rgb("reflectance", 0.1, 0.2, 0.3) + "</bsdf></shape>"))
+        np.testing.assert_allclose(self.render(path, "--vpls", 10, layers="albedo")[0][1, 1], (0.1, 0.2, 0.3), rtol=1e-5)
+        self.assert_ends(lumicut("render", self.write("loop.xml", scene('<shape type="sphere"><bsdf type="twosided" id="a"><ref id="a"/></bsdf></shape>')),
+                                 "-o", self.folder / "x.exr"), BAD_FILE, "without end")
+
     def test_scenes_of_before_version_2_are_read_as_they_are_now(self):
         now = scene(camera((0, 3, 5), (0, 0, 0)), '<emitter type="constant"/>',
                     '<shape type="rectangle">' + placed('<rotate x="1" angle="-90"/>') + '<bsdf type="roughplastic"><texture name="diffuse_reflectance" type="checkerboard">'

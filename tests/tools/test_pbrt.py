@@ -239,6 +239,23 @@ class Pbrt(SceneFiles):
         found = self.square(space, 'Material "diffuse" "texture reflectance" "t"')[0][:, :, 0]
         np.testing.assert_allclose([found[0, 0], found[0, 3], found[3, 0], found[3, 3]], [0.2, 0.8, 0.8, 0.2], atol=1e-5)
 
+    def test_textures_are_placed_around_a_sphere_and_a_cylinder(self):
+        # Red, green, blue and white by quarters of a turn: the picture's first row is v = 1.
+        (self.folder / "turn.png").write_bytes(test_gltf.png(4, 1, [(255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 255)]))
+        texture = 'Texture "t" "spectrum" "imagemap" "string filename" "turn.png" "string filter" "point" "string mapping" "cylindrical"'
+        found = self.square(texture, 'Material "diffuse" "texture reflectance" "t"')[0]
+        # u is (pi + atan2(y, x)) / 2 pi.
+        for (y, x), wanted in (((0, 0), (1, 1, 1)), ((0, 3), (0, 0, 1)), ((3, 0), (1, 0, 0)), ((3, 3), (0, 1, 0))):
+            np.testing.assert_allclose(found[y, x], wanted, atol=1e-4)
+        # v is atan2(y, x) / 2 pi, within 0 to 1, and u the angle to z, here nearly a quarter turn: z is .01.
+        (self.folder / "turn.png").write_bytes(test_gltf.png(1, 4, [(255, 255, 255), (0, 0, 255), (0, 255, 0), (255, 0, 0)]))
+        found = self.square(texture.replace("cylindrical", "spherical"), 'Material "diffuse" "texture reflectance" "t"')[0]
+        for (y, x), wanted in (((0, 3), (1, 0, 0)), ((0, 0), (0, 1, 0)), ((3, 0), (0, 0, 1)), ((3, 3), (1, 1, 1))):
+            np.testing.assert_allclose(found[y, x], wanted, atol=1e-4)
+        # 60 degrees between the normal and the direction: half of each.
+        mix = f'AttributeBegin Rotate 60 0 1 0 Texture "t" "spectrum" "directionmix" "vector3 dir" [ 0 0 2 ] "rgb tex1" [ .8 0 0 ] "rgb tex2" [ 0 .8 0 ] AttributeEnd'
+        np.testing.assert_allclose(self.square(mix, 'Material "diffuse" "texture reflectance" "t"')[0][1, 1], (0.4, 0.4, 0), atol=1e-5)
+
     def test_textures_of_numbers_and_of_colours_may_share_a_name(self):
         found = self.square('Texture "t" "spectrum" "constant" "rgb value" [ .3 .4 .5 ] Texture "t" "float" "constant" "float value" .25',
                             'Texture "both" "spectrum" "scale" "texture tex" "t" "texture scale" "t"', 'Material "diffuse" "texture reflectance" "both"')[0]
