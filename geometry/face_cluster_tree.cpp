@@ -38,6 +38,23 @@ void toggle(Edges& list, uint32_t edge) {
     list.insert(at, edge);
 }
 
+// Whether faces are reached from the first of them over edges. `stamp` holds no `mark` before and after.
+bool joined(const DualGraph& graph, const std::vector<uint32_t>& members, uint32_t mark, std::vector<uint32_t>& stamp,
+            std::vector<uint32_t>& stack) {
+  for (const uint32_t f : members) stamp[f] = mark;
+  size_t reached = 1;
+  stamp[members[0]] = FaceClusterTree::kNone;
+  stack.assign(1, members[0]);
+  while (!stack.empty()) {
+    const uint32_t f = stack.back();
+    stack.pop_back();
+    for (const uint32_t g : graph.of(f))
+      if (stamp[g] == mark) stamp[g] = FaceClusterTree::kNone, ++reached, stack.push_back(g);
+  }
+  for (const uint32_t f : members) stamp[f] = FaceClusterTree::kNone;
+  return reached == members.size();
+}
+
 }  // namespace
 
 double FaceClusterTree::imbalance_of(double a, double b) {
@@ -64,6 +81,19 @@ void FaceClusterTree::refresh(uint32_t n) {
   x.perimeter.clear();
   std::set_symmetric_difference(a.perimeter.begin(), a.perimeter.end(), b.perimeter.begin(), b.perimeter.end(),
                                 std::back_inserter(x.perimeter));
+  if (options_.simply_connected) x.euler = joint_euler(x.left, x.right, shared(a.perimeter, b.perimeter));
+}
+
+// What two clusters have in common lies on both perimeters.
+int32_t FaceClusterTree::joint_euler(uint32_t a, uint32_t b, int shared_edges) const {
+  const auto vertices = [&](uint32_t n) {
+    std::vector<uint32_t> v;
+    for (const uint32_t e : nodes_[n].perimeter) v.insert(v.end(), edge_vertices_[e].begin(), edge_vertices_[e].end());
+    std::sort(v.begin(), v.end());
+    v.erase(std::unique(v.begin(), v.end()), v.end());
+    return v;
+  };
+  return nodes_[a].euler + nodes_[b].euler - (shared(vertices(a), vertices(b)) - shared_edges);
 }
 
 struct FaceClusterTree::Choice {
@@ -71,6 +101,7 @@ struct FaceClusterTree::Choice {
   uint32_t keep = kNone, pair_a = kNone, pair_b = kNone, other_a = kNone, other_b = kNone;
   double gamma = 0, beta = 0;
   double gain = 0;  // imbalance that the nodes whose children change have less in sum
+  int spoilt = 0;   // clusters that are no discs, more than before
 };
 
 // Fig. 3 after the text of sec. 3.2. Afterwards the children that were newly paired are looked at in turn.
@@ -84,7 +115,14 @@ void FaceClusterTree::rebalance(uint32_t n, int& steps) {
   const double beta_now = imbalance(n), gamma_now = gamma(length(l), length(r));
   const bool unbalanced = beta_now > options_.tau;
   Choice best;
+  const auto is_disc = [&](uint32_t x) { return nodes_[x].euler == 1; };
   const auto consider = [&](const Choice& c) {
+    if (c.spoilt > 0) return;
+    if (c.spoilt < best.spoilt) {
+      best = c;
+      return;
+    }
+    if (best.spoilt < 0 && c.spoilt > best.spoilt) return;
     // Lengths are few and small near the leaves: most choices there tie, and balance decides.
     const bool shorter = c.gamma < gamma_now || (c.gamma == gamma_now && c.gain > kLeastGain);
     if (polishing_) {
@@ -115,7 +153,9 @@ void FaceClusterTree::rebalance(uint32_t n, int& steps) {
     const double beta = imbalance_of(weight(keep), weight(joins) + weight(with));
     const double gain =
         beta_now + imbalance_of(weight(keep), weight(joins)) - beta - imbalance_of(weight(joins), weight(with));
-    consider({0, keep, joins, with, kNone, kNone, gamma(length(keep), pair), beta, gain});
+    const int spoilt =
+        !options_.simply_connected ? 0 : (joint_euler(joins, with, common) != 1) - !is_disc(nodes_[keep].parent);
+    consider({0, keep, joins, with, kNone, kNone, gamma(length(keep), pair), beta, gain, spoilt});
   };
   if (l_inner)
     for (int i = 0; i < 2; ++i) rotate(left[1 - i], left[i], r, s[i][0] + s[i][1]);
@@ -132,9 +172,13 @@ void FaceClusterTree::rebalance(uint32_t n, int& steps) {
       const double gain = beta_now + imbalance(l) + imbalance(r) - beta -
                           imbalance_of(weight(left[0]), weight(right[j])) -
                           imbalance_of(weight(left[1]), weight(right[1 - j]));
+      const int spoilt = !options_.simply_connected
+                             ? 0
+                             : (joint_euler(left[0], right[j], x) != 1) + (joint_euler(left[1], right[1 - j], y) != 1) -
+                                   !is_disc(l) - !is_disc(r);
       consider({1, kNone, left[0], right[j], left[1], right[1 - j],
                 gamma(length(left[0]) + length(right[j]) - 2.0 * x, length(left[1]) + length(right[1 - j]) - 2.0 * y),
-                beta, gain});
+                beta, gain, spoilt});
     }
   }
   if (best.kind < 0) return;
@@ -168,13 +212,30 @@ FaceClusterTree::FaceClusterTree(const FaceMesh& mesh, std::span<const double> w
       !(options.slack >= 0 && options.slack < 1e6))
     fail_argument("face clusters: alpha " + std::to_string(options.alpha) + ", tau " + std::to_string(options.tau) +
                   " or slack " + std::to_string(options.slack) + " is out of range");
+  if (options.bloom_bits != 0 && (options.bloom_bits < 64 || options.bloom_bits > (1u << 24) ||
+                                  options.bloom_hashes < 1 || options.bloom_hashes > 16))
+    fail_argument("face clusters: a Bloom filter of " + std::to_string(options.bloom_bits) + " bits and " +
+                  std::to_string(options.bloom_hashes) + " hashes");
+  if (options.bloom_bits != 0 && options.simply_connected)
+    fail_argument("face clusters: simply_connected needs exact perimeters, and bloom_bits is " +
+                  std::to_string(options.bloom_bits));
+  if (options.simply_connected) edge_vertices_ = graph.edge_vertices;
   nodes_.reserve(2 * static_cast<size_t>(n));
   nodes_.resize(n);
   for (uint32_t f = 0; f < n; ++f) {
     nodes_[f].weight = weights.empty() ? 0.5 * length(face_normal_area(mesh, f)) : weights[f];
     if (!(nodes_[f].weight >= 0 && nodes_[f].weight < 1e300))
       fail_argument("face clusters: weight " + std::to_string(f) + " is " + std::to_string(nodes_[f].weight));
-    nodes_[f].perimeter.assign(graph.edges_of(f).begin(), graph.edges_of(f).end());
+    Edges& perimeter = nodes_[f].perimeter;
+    if (options.bloom_bits == 0) {
+      perimeter.assign(graph.edges_of(f).begin(), graph.edges_of(f).end());
+      continue;
+    }
+    for (const uint32_t e : graph.edges_of(f))
+      for (int k = 0; k < options.bloom_hashes; ++k)
+        perimeter.push_back(static_cast<uint32_t>(hash64(e, static_cast<uint64_t>(k)) % options.bloom_bits));
+    std::sort(perimeter.begin(), perimeter.end());
+    perimeter.erase(std::unique(perimeter.begin(), perimeter.end()), perimeter.end());
   }
   // Breadth first; each face joins the leaf of the face that it was reached from, and its ancestors rebalance.
   std::vector<uint8_t> seen(n, 0);
@@ -203,7 +264,9 @@ FaceClusterTree::FaceClusterTree(const FaceMesh& mesh, std::span<const double> w
         for (uint32_t a = above; a != kNone; a = nodes_[a].parent) {
           nodes_[a].weight += nodes_[f].weight;
           ++nodes_[a].faces;
-          for (const uint32_t e : graph.edges_of(f)) toggle(nodes_[a].perimeter, e);
+          if (options_.simply_connected)
+            nodes_[a].euler = joint_euler(a, f, shared(nodes_[a].perimeter, nodes_[f].perimeter));
+          for (const uint32_t e : nodes_[f].perimeter) toggle(nodes_[a].perimeter, e);
         }
         for (uint32_t a = parent; a != kNone; a = nodes_[a].parent) {
           int steps = options_.max_steps;
@@ -276,6 +339,57 @@ void FaceClusterTree::set_weights(std::span<const double> weights) {
   settle();
 }
 
+void FaceClusterTree::set_weight(uint32_t face, double weight) {
+  const size_t n = (nodes_.size() + 1) / 2;
+  if (face >= n) fail_argument("face clusters: no face " + std::to_string(face) + " of " + std::to_string(n));
+  if (!(weight >= 0 && weight < 1e300))
+    fail_argument("face clusters: weight " + std::to_string(face) + " is " + std::to_string(weight));
+  nodes_[face].weight = weight;
+  for (uint32_t a = nodes_[face].parent; a != kNone; a = nodes_[a].parent)
+    nodes_[a].weight = nodes_[nodes_[a].left].weight + nodes_[nodes_[a].right].weight;
+  for (uint32_t a = nodes_[face].parent; a != kNone; a = nodes_[a].parent) {
+    int steps = options_.max_steps;
+    rebalance(a, steps);
+  }
+}
+
+FaceClusterTree::Topology FaceClusterTree::topology(const FaceMesh& mesh) const {
+  const DualGraph graph = dual_graph(mesh);
+  Topology t;
+  std::vector<uint32_t> vertex_of(mesh.vertices.size(), kNone), edge_of(graph.edge_vertices.size(), kNone), members,
+      stamp(mesh.faces.size(), kNone), stack;
+  for (uint32_t x = 0; x < nodes_.size(); ++x) {
+    if (nodes_[x].left == kNone) continue;
+    members_of(x, members, stack);
+    if (!joined(graph, members, x, stamp, stack)) {
+      ++t.disconnected;
+      continue;
+    }
+    auto euler = static_cast<int64_t>(members.size());
+    for (const uint32_t f : members) {
+      for (const uint32_t v : mesh.faces[f])
+        if (vertex_of[v] != x) vertex_of[v] = x, ++euler;
+      for (const uint32_t e : graph.edges_of(f))
+        if (edge_of[e] != x) edge_of[e] = x, --euler;
+    }
+    ++(euler == 1 ? t.discs : t.holed);
+  }
+  return t;
+}
+
+void FaceClusterTree::members_of(uint32_t n, std::vector<uint32_t>& members, std::vector<uint32_t>& stack) const {
+  members.clear();
+  stack.assign(1, n);
+  while (!stack.empty()) {
+    const uint32_t y = stack.back();
+    stack.pop_back();
+    if (nodes_[y].left == kNone)
+      members.push_back(y);
+    else
+      stack.push_back(nodes_[y].left), stack.push_back(nodes_[y].right);
+  }
+}
+
 double FaceClusterTree::mean_imbalance(bool with_leaves) const {
   double sum = 0;
   size_t inner = 0;
@@ -319,26 +433,8 @@ size_t FaceClusterTree::disconnected_clusters(const DualGraph& graph) const {
   std::vector<uint32_t> stamp((nodes_.size() + 1) / 2, kNone), stack, members;
   for (uint32_t x = 0; x < nodes_.size(); ++x) {
     if (nodes_[x].left == kNone) continue;
-    members.clear();
-    stack.assign(1, x);
-    while (!stack.empty()) {
-      const uint32_t y = stack.back();
-      stack.pop_back();
-      if (nodes_[y].left == kNone)
-        members.push_back(y), stamp[y] = x;
-      else
-        stack.push_back(nodes_[y].left), stack.push_back(nodes_[y].right);
-    }
-    size_t reached = 1;
-    stamp[members[0]] = kNone;
-    stack.assign(1, members[0]);
-    while (!stack.empty()) {
-      const uint32_t f = stack.back();
-      stack.pop_back();
-      for (const uint32_t g : graph.of(f))
-        if (stamp[g] == x) stamp[g] = kNone, ++reached, stack.push_back(g);
-    }
-    bad += reached != members.size();
+    members_of(x, members, stack);
+    bad += !joined(graph, members, x, stamp, stack);
   }
   return bad;
 }
@@ -350,6 +446,7 @@ FaceClusterTree::Bloom FaceClusterTree::bloom_statistics(uint32_t bits, int hash
                   " hashes");
   Bloom b;
   for (const uint32_t s : sizes) b.rows.push_back({s});
+  if (options_.bloom_bits != 0) fail_state("face clusters: statistics of Bloom filters need exact perimeters");
   const size_t words = bits / 64;
   std::vector<std::vector<uint64_t>> pool;  // vectors of the nodes whose parent is still to come
   for (const uint32_t x : postorder()) {

@@ -41,8 +41,10 @@ FaceKmeans::FaceKmeans(FaceMesh mesh, const FaceKmeansOptions& options) : mesh_(
   if (options_.clusters < 1 || options_.clusters > mesh_.faces.size())
     fail_argument("face clusters: " + std::to_string(options_.clusters) + " clusters of " +
                   std::to_string(mesh_.faces.size()) + " faces");
-  if (!(options_.lambda >= 1 && options_.lambda < 1e6))
-    fail_argument("face clusters: lambda is " + std::to_string(options_.lambda) + ", not 1 or more");
+  const bool sander = options_.metric == FaceKmeansOptions::Metric::sander;
+  if (sander ? !(options_.lambda >= 1 && options_.lambda < 1e6) : !(options_.lambda >= 0 && options_.lambda <= 1))
+    fail_argument("face clusters: lambda is " + std::to_string(options_.lambda) +
+                  (sander ? ", not 1 or more" : ", not in [0, 1]"));
   if (!(options_.normal_tolerance >= 0 && options_.normal_tolerance < 3) ||
       !(options_.seed_tolerance >= 0 && options_.seed_tolerance < 1e3))
     fail_argument("face clusters: the tolerances " + std::to_string(options_.normal_tolerance) + " and " +
@@ -52,6 +54,10 @@ FaceKmeans::FaceKmeans(FaceMesh mesh, const FaceKmeansOptions& options) : mesh_(
   const size_t n = mesh_.faces.size();
   centre_.resize(n), normal_.resize(n), area_.resize(n);
   for (uint32_t f = 0; f < n; ++f) geometry_of(f);
+  double sum = 0;
+  for (uint32_t f = 0; f < n; ++f)
+    for (const uint32_t v : graph_.of(f)) sum += length(centre_[v] - centre_[f]);
+  if (!graph_.neighbour.empty() && sum > 0) unit_ = sum / static_cast<double>(graph_.neighbour.size());
   label_.assign(n, kNone), pred_.assign(n, kNone), stamp_.assign(n, 0u);
   dist_.assign(n, kFar), inner_.assign(n, kFar);
   choose_seeds(options_.clusters);
@@ -65,11 +71,16 @@ void FaceKmeans::geometry_of(uint32_t f) {
 }
 
 double FaceKmeans::cost(uint32_t c, uint32_t from, uint32_t to) const {
+  if (options_.metric == FaceKmeansOptions::Metric::schlafman) {
+    const double cosine = dot(normal_[from], normal_[to]);
+    return (1 - options_.lambda) * (1 - std::min(1.0, cosine * cosine)) +
+           (options_.lambda + options_.geodesic) * (length(centre_[to] - centre_[from]) / unit_);
+  }
   return (std::max(0.0, options_.lambda - dot(cluster_normal_[c], normal_[to])) + options_.geodesic) *
          length(centre_[to] - centre_[from]);
 }
 
-void FaceKmeans::choose_seeds(uint32_t k) {
+void FaceKmeans::bisect(uint32_t k) {
   std::vector<uint32_t> faces(mesh_.faces.size());
   std::iota(faces.begin(), faces.end(), 0u);
   struct Part {
@@ -77,7 +88,6 @@ void FaceKmeans::choose_seeds(uint32_t k) {
     uint32_t count;
   };
   std::vector<Part> stack{{0, faces.size(), k}};
-  std::vector<uint8_t> is_seed(faces.size(), 0);
   while (!stack.empty()) {
     const Part p = stack.back();
     stack.pop_back();
@@ -90,7 +100,6 @@ void FaceKmeans::choose_seeds(uint32_t k) {
         const double a = length2(centre_[faces[i]] - mean), b = length2(centre_[best] - mean);
         if (a < b || (a == b && faces[i] < best)) best = faces[i];
       }
-      is_seed[best] = 1;
       seed_.push_back(best);
       continue;
     }
@@ -111,8 +120,22 @@ void FaceKmeans::choose_seeds(uint32_t k) {
     stack.push_back({mid, p.end, p.count - left});
     stack.push_back({p.begin, mid, left});
   }
+}
+
+void FaceKmeans::choose_seeds(uint32_t k) {
+  if (options_.random_seeds) {
+    std::vector<uint32_t> faces(mesh_.faces.size());
+    std::iota(faces.begin(), faces.end(), 0u);
+    Rng rng(options_.seed, Stage::test, 11);
+    for (uint32_t i = 0; i < k; ++i) {
+      std::swap(faces[i], faces[i + rng.next_below(static_cast<uint32_t>(faces.size() - i))]);
+      seed_.push_back(faces[i]);
+    }
+  } else {
+    bisect(k);
+  }
   // Every component gets a seed: its least face.
-  std::vector<uint8_t> seen(faces.size(), 0);
+  std::vector<uint8_t> seen(mesh_.faces.size(), 0);
   const auto flood = [&](uint32_t start) {
     seen[start] = 1;
     stack_.assign(1, start);
@@ -389,7 +412,7 @@ FaceKmeans::State FaceKmeans::iterate() {
     faces_[c].erase(std::unique(faces_[c].begin(), faces_[c].end()), faces_[c].end());
     // Only a cluster whose seed moved, or whose normal in use turned, grows anew.
     const bool turned = update_normal(c, was == 2 ? 0.0 : options_.normal_tolerance), shifted = recentre(c);
-    dirty_[c] = turned || shifted;
+    dirty_[c] = (turned && options_.metric == FaceKmeansOptions::Metric::sander) || shifted;
   }
   if (incremental)
     for (const uint32_t f : moved) previous_[f] = label_[f];

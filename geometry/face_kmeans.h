@@ -11,6 +11,8 @@
 //   further away. Here faces of unchanged clusters keep their distances until a better one arrives; the faces reached
 //   through a lost face are then reset, and grow again from around them.
 // - Eq. 8 with lambda = 1 is 0 on plane regions; `geodesic` adds a little of the plain distance.
+// - Eq. 9 sets angles against lengths; these are divided by the mesh's mean distance between neighbouring faces, so
+//   that the unit does not matter.
 // - ties go to the smaller cluster; a sequence of labels that comes again ends the iterations.
 // - hysteresis on normals and seeds, without which few clusters ever come to rest (docs/benchmarks_geometry.md).
 // - merging and splitting, which the paper leaves to be done.
@@ -28,8 +30,15 @@ namespace lumicut {
 struct FaceKmeansOptions {
   enum class Method { single_heap, nested_heaps, incremental };
   Method method = Method::incremental;
+  enum class Metric {
+    sander,     // Eq. 8: (lambda - cosine to the cluster's normal) times distance; lambda 1 or more
+    schlafman,  // Eq. 9: (1 - lambda)(1 - cosine² between the faces) + lambda times distance; lambda in [0, 1]
+  };
+  Metric metric = Metric::sander;
   uint32_t clusters = 256;  // at least one a connected component is made
-  double lambda = 1.0;      // Eq. 8
+  double lambda = 1.0;
+  bool random_seeds = false;  // first seeds: faces at random, in place of bisection
+  uint64_t seed = 0;          // of those
   double geodesic = 1e-3;
   // Hysteresis; 0 and 0 is the paper. A cluster's normal in Eq. 8 follows once it has turned by more than this
   // (radians), and its seed moves when the new face is further inside than the old one by more than this share.
@@ -83,6 +92,7 @@ class FaceKmeans {
   double cost(uint32_t cluster, uint32_t from, uint32_t to) const;
   void geometry_of(uint32_t f);
   void choose_seeds(uint32_t k);
+  void bisect(uint32_t k);
   void grow_all_single();
   void grow_all_nested();
   void grow_incremental();
@@ -96,6 +106,7 @@ class FaceKmeans {
   FaceKmeansOptions options_;
   std::vector<Vec3d> centre_, normal_;  // by face; unit normals, zero for degenerate faces
   std::vector<double> area_;
+  double unit_ = 1;  // of lengths in Eq. 9
   std::vector<uint32_t> label_, previous_, seed_, pred_;
   std::vector<double> dist_, inner_;
   std::vector<Vec3d> cluster_normal_;

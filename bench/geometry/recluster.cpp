@@ -83,35 +83,109 @@ void tree(const std::string& scenes) {
                 t->mean_imbalance(true), build, static_cast<double>(t->perimeter_bytes()) / 1e6,
                 t->disconnected_clusters(dual_graph(m)));
     const uint32_t sizes[] = {1000, 8000};
-    FaceClusterTree::Bloom rows[4];
-    double bytes = 0, rle = 0;
-    for (int k = 0; k < 4; ++k) {
-      rows[k] = t->bloom_statistics(2048u << k, 1, sizes);
-      if (k == 2) {
-        const auto two = t->bloom_statistics(8192, 2, sizes);
-        bytes = static_cast<double>(two.bytes) / 1e6, rle = static_cast<double>(two.run_length_bytes) / 1e6;
-      }
-    }
+    FaceClusterTree::Bloom rows[2][4];
+    for (int k = 0; k < 4; ++k)
+      for (int hashes : {1, 2}) rows[hashes - 1][k] = t->bloom_statistics(2048u << k, hashes, sizes);
+    const double bytes = static_cast<double>(rows[1][2].bytes) / 1e6,
+                 rle = static_cast<double>(rows[1][2].run_length_bytes) / 1e6;
     Rng rng(1, Stage::test);
     std::vector<double> w(m.faces.size());
     for (size_t f = 0; f < w.size(); ++f) w[f] = t->nodes()[f].weight * std::exp2(2 * rng.next_float() - 1);
     const double again = time_of([&] { t->set_weights(w); });
     std::printf(" %6.3f (%5.3f) %9.3f | %12.1f %10.1f\n", t->mean_imbalance(false), t->mean_imbalance(true), again,
                 bytes, rle);
+    // The same weights one after the other, as the paper does it.
+    FaceClusterTree one(m, {});
+    const double each = time_of([&] {
+      for (uint32_t f = 0; f < w.size(); ++f) one.set_weight(f, w[f]);
+    });
+    std::printf("       one face's weight at a time: %.1f us a face, imbalance %.3f\n",
+                1e6 * each / static_cast<double>(w.size()), one.mean_imbalance(false));
     for (size_t r = 0; r < 2; ++r) {
-      if (rows[0].rows[r].nodes == 0) continue;
-      std::printf(
-          "       bits lost at %u faces, 1 bit an edge, measured / model (Eq. 7, its perimeter), m = 2K 4K 8K 16K:",
-          sizes[r]);
-      for (int k = 0; k < 4; ++k) {
-        double n = 3, e = 3;
-        const double bits = 2048 << k;
-        for (double size = 1; size < 0.99 * sizes[r]; size *= 2) n = 1.5 * n * (1 - n / bits), e *= 1.5;
-        std::printf(" %.3f/%.3f", rows[k].rows[r].loss, 1 - n / e);
+      if (rows[0][0].rows[r].nodes == 0) continue;
+      for (const int hashes : {1, 2}) {
+        std::printf(
+            "       bits lost at %u faces, %d an edge, measured / model (Eq. 7, its perimeter), m = 2K 4K 8K 16K:",
+            sizes[r], hashes);
+        for (int k = 0; k < 4; ++k) {
+          double n = 3 * hashes, e = n;
+          const double bits = 2048 << k;
+          for (double size = 1; size < 0.99 * sizes[r]; size *= 2) n = 1.5 * n * (1 - n / bits), e *= 1.5;
+          std::printf(" %.3f/%.3f", rows[hashes - 1][k].rows[r].loss, 1 - n / e);
+        }
+        std::printf("  perimeter %.0f\n", rows[0][0].rows[r].edges);
       }
-      std::printf("  perimeter %.0f\n", rows[0].rows[r].edges);
     }
     std::fflush(stdout);
+  }
+}
+
+// Exact perimeters of inner clusters of 64 faces and more, over the square root of their faces: 3.7 is a disc's.
+double roundness(const FaceClusterTree& t, const DualGraph& graph) {
+  const auto& nodes = t.nodes();
+  double sum = 0;
+  size_t count = 0;
+  std::vector<uint8_t> odd(graph.edge_vertices.size(), 0);
+  std::vector<uint32_t> stack, edges;
+  for (uint32_t x = 0; x < nodes.size(); ++x) {
+    if (nodes[x].faces < 64) continue;
+    edges.clear();
+    stack.assign(1, x);
+    while (!stack.empty()) {
+      const uint32_t y = stack.back();
+      stack.pop_back();
+      if (nodes[y].left != FaceClusterTree::kNone) {
+        stack.push_back(nodes[y].left), stack.push_back(nodes[y].right);
+        continue;
+      }
+      for (const uint32_t e : graph.edges_of(y)) edges.push_back(e), odd[e] ^= 1;
+    }
+    size_t perimeter = 0;
+    for (const uint32_t e : edges)
+      if (odd[e]) odd[e] = 0, ++perimeter;
+    sum += static_cast<double>(perimeter) / std::sqrt(static_cast<double>(nodes[x].faces)), ++count;
+  }
+  return count ? sum / static_cast<double>(count) : 0;
+}
+
+void filters(const std::string& scenes) {
+  std::printf("\n## filters: Table 1 (bits lost at a leaf), Table 2 (edges of a perimeter), by Eq. 3-6\n");
+  for (const double m : {2048.0, 4096.0, 8192.0}) {
+    std::printf("m = %5.0f bits:", m);
+    for (const double e : {3.0, 6.0})
+      std::printf("  e = %.0f: %.4f %%", e, 100 * (1 - m / e * (1 - std::pow((m - 1) / m, e))));
+    std::printf("\n");
+  }
+  for (const int level : {10, 13, 18, 20}) {
+    std::printf("%8d faces:", 1 << level);
+    for (const double c : {1 / 3.0, 1 / 4.0, 1 / 6.0}) std::printf(" %8.0f", 3 * std::pow(2 * (1 - c), level));
+    std::printf("  (c = 1/3, 1/4, 1/6)\n");
+  }
+  std::printf(
+      "\n## trees that work with the filters: imbalance, perimeter over square root of faces, clusters that are discs, "
+      "with holes, not connected; seconds\n");
+  for (const char* name : {"cow", "bunny"}) {
+    const FaceMesh m = load(scenes, name);
+    const DualGraph graph = dual_graph(m);
+    const auto row = [&](const char* what, const FaceClusterTreeOptions& o) {
+      std::unique_ptr<FaceClusterTree> t;
+      const double s = time_of([&] { t = std::make_unique<FaceClusterTree>(m, std::span<const double>(), o); });
+      const auto topology = t->topology(m);
+      std::printf("%-6s %-26s %6.3f %6.2f %7zu %5zu %5zu %8.2f %8.2f MB\n", name, what, t->mean_imbalance(false),
+                  roundness(*t, graph), topology.discs, topology.holed, topology.disconnected, s,
+                  static_cast<double>(t->perimeter_bytes()) / 1e6);
+      std::fflush(stdout);
+    };
+    row("exact", {});
+    FaceClusterTreeOptions o;
+    o.simply_connected = true;
+    row("exact, simply connected", o);
+    o.simply_connected = false;
+    for (const int hashes : {1, 2})
+      for (uint32_t bits = 512; bits <= 8192; bits *= 4) {
+        o.bloom_bits = bits, o.bloom_hashes = hashes;
+        row((std::to_string(bits) + " bits, " + std::to_string(hashes) + " an edge").c_str(), o);
+      }
   }
 }
 
@@ -238,5 +312,6 @@ int main(int argc, char** argv) {
     return 0;
   }
   if (argc < 2 || !std::strcmp(argv[1], "tree")) tree(scenes);
+  if (argc < 2 || !std::strcmp(argv[1], "filters")) filters(scenes);
   if (argc < 2 || !std::strcmp(argv[1], "kmeans")) kmeans(scenes);
 }

@@ -14,6 +14,7 @@ import numpy as np
 NONE = 0xFFFFFFFF
 STRATEGIES = ("naive", "heap", "local", "parallel")
 BUILDERS = ("kd", "top-down", "insertion", "cheap-insertion", "bottom-up")
+METRICS = ("sander", "schlafman")
 SEARCHES = ("containing", "intersecting", "contained")
 _SIZES, _DOUBLES, _INDICES = POINTER(c_size_t), POINTER(c_double), POINTER(c_uint32)
 
@@ -23,7 +24,8 @@ class Error(ValueError):
 
 
 class FaceClustersDesc(ctypes.Structure):
-    _fields_ = [("struct_size", c_uint32), ("clusters", c_uint32), ("lambda_", c_double), ("geodesic", c_double)]
+    _fields_ = [("struct_size", c_uint32), ("clusters", c_uint32), ("lambda_", c_double), ("geodesic", c_double), ("metric", c_uint32),
+                ("random", c_uint32), ("seed", c_uint64)]
 
 
 class HittingSetInfo(ctypes.Structure):
@@ -70,6 +72,8 @@ FUNCTIONS = {
     "face_tree_create": (c_int, [_DOUBLES, c_size_t, _INDICES, c_size_t, _DOUBLES, POINTER(c_void_p)]),
     "face_tree_release": (None, [c_void_p]),
     "face_tree_set_weights": (c_int, [c_void_p, _DOUBLES]),
+    "face_tree_set_weight": (c_int, [c_void_p, c_uint32, c_double]),
+    "texture_atlas": (c_int, [_DOUBLES, c_size_t, _INDICES, c_size_t, _INDICES, c_double, _DOUBLES, _SIZES]),
     "face_tree_read": (c_int, [c_void_p, c_int, _INDICES, _DOUBLES]),
 }
 CGAL_FUNCTIONS = {
@@ -381,13 +385,15 @@ class _OfMesh(_Object):
 
 
 class FaceClusters(_OfMesh):
-    """Compact clusters of the faces (n, 3) of a mesh, kept up as it moves. `lambda_`: share of normals in the distance."""
+    """Compact clusters of the faces (n, 3) of a mesh, kept up as it moves. metric: sander (Eq. 8, by normals of clusters, lambda_ 1 or
+    more) or schlafman (Eq. 9, by angles between faces, lambda_ 0 to 1). random_seeds: a number, in place of bisection."""
 
     _release = "lumicut_face_clusters_release"
 
-    def __init__(self, vertices, faces, clusters=256, lambda_=1.0, geodesic=1e-3):
+    def __init__(self, vertices, faces, clusters=256, lambda_=1.0, geodesic=1e-3, metric="sander", random_seeds=None):
         super().__init__(vertices, faces)
-        desc = FaceClustersDesc(ctypes.sizeof(FaceClustersDesc), clusters, lambda_, geodesic)
+        desc = FaceClustersDesc(ctypes.sizeof(FaceClustersDesc), clusters, lambda_, geodesic, _choice(metric, METRICS, "metric"),
+                                random_seeds is not None, random_seeds or 0)
         _check(_geometry().lumicut_face_clusters_create(*self._mesh, byref(desc), byref(self._handle)))
 
     def run(self, limit=1000):
@@ -437,6 +443,10 @@ class FaceTree(_OfMesh):
     def set_weights(self, weights):
         _check(_geometry().lumicut_face_tree_set_weights(self._handle, _pointer(_numbers(weights, len(self._faces), "weights"))))
 
+    def set_weight(self, face, weight):
+        """One face's: its ancestors alone rebalance."""
+        _check(_geometry().lumicut_face_tree_set_weight(self._handle, face, weight))
+
     def labels(self, level):
         """Clusters of a level; the root is level 0."""
         labels = np.empty(len(self._faces), np.uint32)
@@ -448,3 +458,15 @@ class FaceTree(_OfMesh):
         value = c_double()
         _check(_geometry().lumicut_face_tree_read(self._handle, 0, None, byref(value)))
         return value.value
+
+
+def texture_atlas(vertices, faces, labels, gap=1 / 512):
+    """Texture coordinates (n, 3, 2) of the corners of faces, in the unit square: a chart for each label, projected along its mean normal;
+    and how many faces look away from their chart."""
+    mesh = _OfMesh(vertices, faces)
+    labels = _whole(labels, "labels")
+    if labels.shape != (len(mesh._faces),):
+        raise Error(f"labels: {len(mesh._faces)} are wanted, not an array {labels.shape}")
+    corners, turned_away = np.empty((len(labels), 3, 2)), c_size_t()
+    _check(_geometry().lumicut_texture_atlas(*mesh._mesh, _pointer(labels, c_uint32), gap, _pointer(corners), byref(turned_away)))
+    return corners, turned_away.value

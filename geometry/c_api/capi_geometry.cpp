@@ -12,6 +12,7 @@
 #include "geometry/hitting_set.h"
 #include "geometry/independent_set.h"
 #include "geometry/instances.h"
+#include "geometry/texture_atlas.h"
 
 using namespace lumicut;
 using namespace lumicut::c_api;
@@ -342,6 +343,10 @@ int lumicut_face_clusters_create(const double* vertices, size_t vertex_count, co
       if (desc->clusters != 0) o.clusters = desc->clusters;
       if (!(desc->lambda < 0)) o.lambda = desc->lambda;
       if (!(desc->geodesic < 0)) o.geodesic = desc->geodesic;
+      if (desc->metric > 1) fail_argument("lumicut_face_clusters_desc.metric is " + std::to_string(desc->metric));
+      if (desc->random > 1) fail_argument("lumicut_face_clusters_desc.random is " + std::to_string(desc->random));
+      if (desc->metric == 1) o.metric = FaceKmeansOptions::Metric::schlafman;
+      o.random_seeds = desc->random == 1, o.seed = desc->seed;
     }
     *clusters = new lumicut_face_clusters_t{FaceKmeans(mesh_of(vertices, vertex_count, faces, face_count), o)};
   });
@@ -400,6 +405,22 @@ int lumicut_face_tree_set_weights(lumicut_face_tree tree, const double* weights)
   return guard([&] {
     auto& t = required(tree, "tree");
     t.tree.set_weights(array(weights, t.mesh.faces.size(), 1, "weights"));
+  });
+}
+
+int lumicut_face_tree_set_weight(lumicut_face_tree tree, uint32_t face, double weight) {
+  return guard([&] { required(tree, "tree").tree.set_weight(face, weight); });
+}
+
+int lumicut_texture_atlas(const double* vertices, size_t vertex_count, const uint32_t* faces, size_t face_count,
+                          const uint32_t* labels, double gap, double* corners, size_t* turned_away) {
+  return guard([&] {
+    const FaceMesh mesh = mesh_of(vertices, vertex_count, faces, face_count);
+    const TextureAtlas atlas = make_texture_atlas(mesh, array(labels, face_count, 1, "labels"), gap);
+    if (face_count != 0) required(corners, "corners");
+    for (const auto& face : atlas.corners)
+      for (const Point2& p : face) *corners++ = p.x, *corners++ = p.y;
+    if (turned_away != nullptr) *turned_away = atlas.turned_away;
   });
 }
 

@@ -13,6 +13,7 @@
 #include "geometry/face_cluster_tree.h"
 #include "geometry/face_kmeans.h"
 #include "geometry/mesh_file.h"
+#include "geometry/texture_atlas.h"
 #include "io/atomic_file.h"
 #include "io/scene_obj.h"
 
@@ -21,10 +22,14 @@ namespace {
 
 struct Arguments {
   std::vector<std::string> meshes;  // the first one, then those of further frames
-  std::string out = ".", method = "kmeans", weights;
+  std::string out = ".", method = "kmeans", weights, metric = "sander", atlas;
   int frames = 30;
   FaceKmeansOptions kmeans;
   double error = 0;  // share of the surface; 0: none asked for
+  FaceClusterTreeOptions tree;
+  double gap = 1.0 / 512;
+  bool boxes = false;
+  int64_t random_seeds = -1;
   int level = 6;
   double reach = 0.25, amount = 0.15;
   int width = 800, height = 600;
@@ -94,7 +99,27 @@ void save(const Arguments& a, int frame, const FaceMesh& mesh, const std::vector
   const std::string base = (std::filesystem::path(a.out) / name).string();
   io::write_whole_file(base + ".ply", ply_of(mesh, colours));
   io::write_whole_file(base + ".csv", text);
+  if (a.boxes) {
+    std::string rows = "cluster,x0,y0,z0,x1,y1,z1\n";
+    char line[224];
+    for (const ClusterBox& b : cluster_boxes(mesh, labels)) {
+      std::snprintf(line, sizeof line, "%u,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", b.label, b.lo.x, b.lo.y, b.lo.z,
+                    b.hi.x, b.hi.y, b.hi.z);
+      rows += line;
+    }
+    io::write_whole_file(base + "_boxes.csv", rows);
+  }
   if (!a.no_pictures) io::write_whole_file(base + ".png", png_of(draw_mesh(mesh, colours, a.width, a.height, a.z_up)));
+}
+
+// Of the last frame.
+void save_atlas(const Arguments& a, const FaceMesh& mesh, const std::vector<uint32_t>& labels) {
+  if (a.atlas.empty()) return;
+  const TextureAtlas atlas = make_texture_atlas(mesh, labels, a.gap);
+  write_text(a.atlas, obj_of(mesh, atlas));
+  std::printf(
+      "atlas: %zu charts cover %.1f %% of the square, are %.2f %% smaller than the surface; %zu faces turned away\n",
+      atlas.charts, 100 * atlas.used, 100 * atlas.shrink, atlas.turned_away);
 }
 
 double area_of(const FaceMesh& mesh) {
@@ -119,21 +144,30 @@ std::vector<double> weights_of(const Arguments& a, const FaceMesh& mesh) {
 
 int by_tree(const Arguments& a, const Frames& frames) {
   FaceMesh now = frames.start();
-  FaceClusterTree tree(now, weights_of(a, now));
+  FaceClusterTree tree(now, weights_of(a, now), a.tree);
+  std::vector<uint32_t> labels;
   for (int frame = 0; frame < frames.count(); ++frame) {
     now.vertices = frames.vertices(frame);
     const std::vector<double> weights = weights_of(a, now);
     const auto t = std::chrono::steady_clock::now();
     tree.set_weights(weights);
     std::printf("frame %d: %.2f ms, mean imbalance %.3f\n", frame, 1e3 * seconds_since(t), tree.mean_imbalance(false));
-    save(a, frame, now, tree.labels_at_level(a.level));
+    labels = tree.labels_at_level(a.level);
+    save(a, frame, now, labels);
   }
+  const FaceClusterTree::Topology t = tree.topology(now);
+  std::printf("clusters of the tree: %zu discs, %zu with holes or touching themselves, %zu not connected\n", t.discs,
+              t.holed, t.disconnected);
+  save_atlas(a, now, labels);
   return 0;
 }
 
 int by_kmeans(const Arguments& a, const Frames& frames) {
   FaceMesh now = frames.start();
-  FaceKmeans clusters(now, a.kmeans);
+  FaceKmeansOptions options = a.kmeans;
+  if (a.metric == "schlafman") options.metric = FaceKmeansOptions::Metric::schlafman;
+  if (a.random_seeds >= 0) options.random_seeds = true, options.seed = static_cast<uint64_t>(a.random_seeds);
+  FaceKmeans clusters(now, options);
   for (int frame = 0; frame < frames.count(); ++frame) {
     now.vertices = frames.vertices(frame);
     const auto t = std::chrono::steady_clock::now();
@@ -146,6 +180,7 @@ int by_kmeans(const Arguments& a, const Frames& frames) {
                 area > 0 ? clusters.error() / area : 0.0);
     save(a, frame, now, clusters.labels());
   }
+  save_atlas(a, now, clusters.labels());
   return 0;
 }
 
@@ -153,11 +188,13 @@ int run(const Arguments& a) {
   for (const auto& [name, value] : {std::pair{"--reach", a.reach},
                                     {"--amount", a.amount},
                                     {"--error", a.error},
+                                    {"--gap", a.gap},
                                     {"--lambda", a.kmeans.lambda},
                                     {"--geodesic", a.kmeans.geodesic}})
     check_finite(name, value);
   if (!a.weights.empty() && a.method != "tree") fail_argument("--weights: of --method tree alone");
   if (a.error > 0 && a.method == "tree") fail_argument("--error: of --method kmeans alone");
+  if (!a.atlas.empty()) check_output(a.atlas);
   const Frames frames(a);
   std::filesystem::create_directories(a.out);
   return a.method == "tree" ? by_tree(a, frames) : by_kmeans(a, frames);
@@ -176,8 +213,13 @@ Command add_recluster(CLI::App& app) {
   command->add_option("--method", a->method, "k-means clusters, or a level of the balanced tree")
       ->check(CLI::IsMember({"kmeans", "tree"}));
   command->add_option("--clusters", a->kmeans.clusters, "Of k-means");
-  command->add_option("--lambda", a->kmeans.lambda, "Of k-means: share of normals in the distance [Eq. 8]")
-      ->check(CLI::Range(0.0, 1.0));
+  command->add_option("--lambda", a->kmeans.lambda, "Of k-means: of the distance; sander: 1 or more, schlafman: 0 to 1")
+      ->check(CLI::Range(0.0, 1e6));
+  command
+      ->add_option("--metric", a->metric, "Of k-means: distance by normals of clusters [Eq. 8], or by angles [Eq. 9]")
+      ->check(CLI::IsMember({"sander", "schlafman"}));
+  command->add_option("--random-seeds", a->random_seeds, "Of k-means: first seeds at random, by this number")
+      ->check(CLI::Range(int64_t{0}, int64_t{1} << 62));
   command->add_option("--geodesic", a->kmeans.geodesic, "Of k-means: plain distance that is added where normals agree")
       ->check(CLI::Range(0.0, 1e6));
   command
@@ -187,6 +229,17 @@ Command add_recluster(CLI::App& app) {
       ->check(CLI::Range(0.0, 1.0));
   command->add_option("--level", a->level, "Of the tree")->check(CLI::Range(0, 64));
   command->add_option("--weights", a->weights, "Of the tree: CSV, a weight a line for each face (none: areas)");
+  command
+      ->add_option("--bloom-bits", a->tree.bloom_bits,
+                   "Of the tree: perimeters in Bloom filters of so many bits (0: exact)")
+      ->check(CLI::Range(0, 1 << 24));
+  command->add_option("--bloom-hashes", a->tree.bloom_hashes, "Bits that an edge sets in them")
+      ->check(CLI::Range(1, 16));
+  command->add_flag("--simply-connected", a->tree.simply_connected,
+                    "Of the tree: refuses changes that make clusters other than discs");
+  command->add_option("--atlas", a->atlas, "OBJ with texture coordinates: a chart for each cluster of the last frame");
+  command->add_option("--gap", a->gap, "Between charts, in parts of the texture")->check(CLI::Range(0.0, 0.1));
+  command->add_flag("--boxes", a->boxes, "Also a CSV of each frame's clusters' bounding boxes");
   command->add_option("--reach", a->reach, "Of the deformation, in diagonals")->check(CLI::Range(1e-6, 100.0));
   command->add_option("--amount", a->amount, "Of the deformation, in diagonals")->check(CLI::Range(0.0, 100.0));
   command->add_option("--width", a->width, "Of the pictures")->check(CLI::Range(16, 10000));

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <limits>
 #include <set>
 
@@ -8,6 +10,7 @@
 #include "core/rng.h"
 #include "geometry/face_cluster_tree.h"
 #include "geometry/face_kmeans.h"
+#include "geometry/texture_atlas.h"
 #include "meshes.h"
 
 namespace lumicut {
@@ -151,6 +154,49 @@ TEST(FaceKmeans, MergeSplitAndTeleportKeepTheMethodsEqual) {
       }
 }
 
+// Eq. 9 goes by angles: at lambda 0 the crease of a folded sheet parts two clusters, wherever their seeds are.
+TEST(FaceKmeans, ByAnglesBordersLieOnCreases) {
+  FaceMesh m = grid_mesh(10, 10, false);
+  double lo = m.vertices[0].x, hi = lo;
+  for (const Vec3d& v : m.vertices) lo = std::min(lo, v.x), hi = std::max(hi, v.x);
+  const double middle = 0.5 * (lo + hi);
+  for (Vec3d& v : m.vertices) v.z = 2 * std::fabs(v.x - middle);
+  FaceKmeansOptions o;
+  o.metric = FaceKmeansOptions::Metric::schlafman;
+  o.clusters = 2, o.lambda = 0;
+  for (const bool random : {false, true}) {
+    o.random_seeds = random, o.seed = 3;
+    FaceKmeans c(m, o);
+    c.run();
+    uint32_t left = FaceKmeans::kNone, right = FaceKmeans::kNone;
+    size_t wrong = 0;
+    for (uint32_t f = 0; f < m.faces.size(); ++f) {
+      uint32_t& side = face_centre(m, f).x < middle ? left : right;
+      if (side == FaceKmeans::kNone) side = c.labels()[f];
+      wrong += c.labels()[f] != side;
+    }
+    if (left != right) {  // both seeds may fall on one side
+      EXPECT_EQ(wrong, 0u);
+    } else {
+      EXPECT_TRUE(random);
+    }
+  }
+  // Scaled, it is the same.
+  o.lambda = 0.5, o.clusters = 7, o.random_seeds = true;
+  FaceKmeans a(m, o);
+  FaceMesh large = m;
+  for (Vec3d& v : large.vertices) v = v * 1024.0;
+  FaceKmeans b(large, o);
+  a.run(), b.run();
+  EXPECT_EQ(a.labels(), b.labels());
+  o.seed = 4;
+  FaceKmeans other(m, o);
+  other.run();
+  EXPECT_NE(a.labels(), other.labels());
+  o.lambda = 1.5;
+  EXPECT_THROW(FaceKmeans(m, o), Error);
+}
+
 TEST(FaceKmeans, RefusesBadInputByName) {
   FaceKmeansOptions o;
   o.clusters = 3;
@@ -220,6 +266,78 @@ TEST(FaceClusterTree, PerimetersAndWeightsAreThoseOfTheFaces) {
   }
 }
 
+TEST(FaceClusterTree, OneWeightMovesItsAncestorsAlone) {
+  const FaceMesh m = both(sphere_mesh(12), grid_mesh(8, 8, false), 3);
+  const DualGraph g = dual_graph(m);
+  Rng rng(6, Stage::test);
+  std::vector<double> w(m.faces.size(), 1.0);
+  FaceClusterTree t(m, w);
+  for (int k = 0; k < 300; ++k) {
+    const uint32_t f = rng.next_below(static_cast<uint32_t>(w.size()));
+    w[f] = std::exp2(4 * rng.next_float() - 2);
+    size_t depth = 0;
+    for (uint32_t a = t.nodes()[f].parent; a != FaceClusterTree::kNone; a = t.nodes()[a].parent) ++depth;
+    const size_t before = t.perturbations();
+    t.set_weight(f, w[f]);
+    ASSERT_LE(t.perturbations() - before, 24 * depth);  // max_steps at each ancestor
+  }
+  expect_consistent(t, g, w);
+  EXPECT_LT(t.mean_imbalance(false), 1.0);
+  EXPECT_THROW(t.set_weight(static_cast<uint32_t>(w.size()), 1), Error);
+  EXPECT_THROW(t.set_weight(0, -1), Error);
+}
+
+// Wide filters lose nothing that decides: the tree is the exact one. Narrow ones lose, and still balance.
+TEST(FaceClusterTree, WorksOnBloomFilters) {
+  const FaceMesh m = torus_mesh(40, 20);
+  const FaceClusterTree exact(m, {});
+  FaceClusterTreeOptions o;
+  o.bloom_bits = 1u << 24, o.bloom_hashes = 1;
+  const FaceClusterTree wide(m, {}, o);
+  for (int level = 0; level < 8; ++level) ASSERT_EQ(wide.labels_at_level(level), exact.labels_at_level(level));
+  o.bloom_bits = 256, o.bloom_hashes = 2;
+  FaceClusterTree narrow(m, {}, o);
+  EXPECT_NE(narrow.labels_at_level(6), exact.labels_at_level(6));
+  EXPECT_LT(narrow.mean_imbalance(false), 1.0);
+  for (const auto& node : narrow.nodes()) {
+    ASSERT_TRUE(std::is_sorted(node.perimeter.begin(), node.perimeter.end()));
+    for (const uint32_t bit : node.perimeter) ASSERT_LT(bit, 256u);
+    if (node.left == FaceClusterTree::kNone) continue;  // a parent's bits are the exclusive or of its children's
+    std::vector<uint32_t> bits;
+    const auto &a = narrow.nodes()[node.left].perimeter, &b = narrow.nodes()[node.right].perimeter;
+    std::set_symmetric_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(bits));
+    ASSERT_EQ(node.perimeter, bits);
+  }
+  const uint32_t sizes[] = {100};
+  EXPECT_THROW(narrow.bloom_statistics(256, 1, sizes), Error);
+  o.bloom_bits = 7;
+  EXPECT_THROW(FaceClusterTree(m, {}, o), Error);
+}
+
+TEST(FaceClusterTree, KeepsClustersSimplyConnectedWhereItMay) {
+  for (const FaceMesh& m : {sphere_mesh(20), torus_mesh(30, 14), both(sphere_mesh(9), grid_mesh(9, 9, false), 3)}) {
+    const FaceClusterTree plain(m, {});
+    FaceClusterTreeOptions o;
+    o.simply_connected = true;
+    FaceClusterTree strict(m, {}, o);
+    const auto before = plain.topology(m), after = strict.topology(m);
+    EXPECT_LE(after.holed, before.holed);
+    EXPECT_LE(after.disconnected, before.disconnected + 1);  // two components
+    EXPECT_EQ(after.discs + after.holed + after.disconnected, m.faces.size() - 1);
+    EXPECT_LT(after.holed, m.faces.size() / 100);
+    // The counts that it keeps are those of the faces.
+    size_t discs = 0;
+    for (const auto& node : strict.nodes()) discs += node.left != FaceClusterTree::kNone && node.euler == 1;
+    EXPECT_GE(discs, after.discs);
+    EXPECT_LE(discs, after.discs + after.disconnected);
+    strict.set_weights(std::vector<double>(m.faces.size(), 1.0));
+    EXPECT_LE(strict.topology(m).holed, after.holed) << "no perturbation makes more";
+  }
+  FaceClusterTreeOptions o;
+  o.simply_connected = true, o.bloom_bits = 256;
+  EXPECT_THROW(FaceClusterTree(sphere_mesh(4), {}, o), Error);
+}
+
 TEST(FaceClusterTree, StaysBalancedAndNearlyConnected) {
   const FaceMesh m = sphere_mesh(30);
   FaceClusterTree t(m, {});
@@ -274,6 +392,65 @@ TEST(FaceClusterTree, DegenerateAndBadInput) {
   EXPECT_THROW(FaceClusterTree(m, std::vector<double>(m.faces.size(), -1.0)), Error);
   const FaceClusterTree flat(m, std::vector<double>(m.faces.size(), 0.0));  // no weight at all
   EXPECT_EQ(flat.mean_imbalance(false), 0.0);
+}
+
+// Charts lie in the square and apart, and are their faces' shapes where those lie in a plane.
+TEST(TextureAtlas, ChartsAreApartAndTrueToPlaneFaces) {
+  FaceMesh m = both(grid_mesh(9, 6, false), sphere_mesh(8), 4);
+  FaceKmeansOptions o;
+  o.clusters = 12;
+  FaceKmeans c(m, o);
+  c.run();
+  const TextureAtlas atlas = make_texture_atlas(m, c.labels(), 0.01);
+  EXPECT_EQ(atlas.charts, c.cluster_count());
+  struct Box {
+    Point2 lo{2, 2}, hi{-2, -2};
+  };
+  std::vector<Box> boxes(c.labels().size());
+  double covered = 0;
+  for (uint32_t f = 0; f < m.faces.size(); ++f) {
+    const auto& t = atlas.corners[f];
+    for (const Point2& p : t) {
+      ASSERT_TRUE(p.x >= 0 && p.x <= 1 && p.y >= 0 && p.y <= 1);
+      Box& b = boxes[c.labels()[f]];
+      b.lo = {std::min(b.lo.x, p.x), std::min(b.lo.y, p.y)}, b.hi = {std::max(b.hi.x, p.x), std::max(b.hi.y, p.y)};
+    }
+    covered += 0.5 * std::fabs((t[1].x - t[0].x) * (t[2].y - t[0].y) - (t[1].y - t[0].y) * (t[2].x - t[0].x));
+    if (f >= 9 * 6 * 2) continue;  // the sheet: a plane
+    for (size_t k = 0; k < 3; ++k) {
+      const Vec3d edge = m.vertices[m.faces[f][(k + 1) % 3]] - m.vertices[m.faces[f][k]];
+      ASSERT_NEAR(std::sqrt(dist2(t[k], t[(k + 1) % 3])), atlas.scale * length(edge), 1e-12);
+    }
+  }
+  EXPECT_NEAR(covered, atlas.used, 1e-9);
+  EXPECT_GT(atlas.used, 0.3);
+  for (size_t i = 0; i < boxes.size(); ++i)
+    for (size_t j = 0; j < i; ++j) {
+      if (boxes[i].lo.x > 1 || boxes[j].lo.x > 1) continue;
+      const double x = std::max(boxes[i].lo.x - boxes[j].hi.x, boxes[j].lo.x - boxes[i].hi.x),
+                   y = std::max(boxes[i].lo.y - boxes[j].hi.y, boxes[j].lo.y - boxes[i].hi.y);
+      EXPECT_GT(std::max(x, y), 0.009) << "the gap";
+    }
+  EXPECT_THROW(make_texture_atlas(m, std::vector<uint32_t>{1}, 0), Error);
+  EXPECT_THROW(make_texture_atlas(m, c.labels(), 0.5), Error);
+  EXPECT_EQ(make_texture_atlas(FaceMesh(), {}, 0).charts, 0u);
+}
+
+TEST(ClusterBoxes, HoldTheirFacesTightly) {
+  const FaceMesh m = sphere_mesh(9);
+  const FaceClusterTree t(m, {});
+  const auto labels = t.labels_at_level(4);
+  const auto boxes = cluster_boxes(m, labels);
+  ASSERT_EQ(boxes.size(), 16u);
+  for (const ClusterBox& b : boxes)
+    for (int axis = 0; axis < 3; ++axis) {
+      double lo = 1e9, hi = -1e9;
+      for (uint32_t f = 0; f < labels.size(); ++f)
+        for (const uint32_t v : m.faces[f])
+          if (labels[f] == b.label) lo = std::min(lo, m.vertices[v][axis]), hi = std::max(hi, m.vertices[v][axis]);
+      EXPECT_EQ(b.lo[axis], lo);
+      EXPECT_EQ(b.hi[axis], hi);
+    }
 }
 
 }  // namespace

@@ -247,6 +247,41 @@ class FaceClusters(unittest.TestCase):
         tree.set_weights(weights)
         self.assertLess(apart(tree), before)
 
+    def test_one_weight_at_a_time_balances_as_well(self):
+        vertices, faces = sheet()
+        tree = g.FaceTree(vertices, faces, np.ones(288))
+        for face in range(288):
+            tree.set_weight(face, 10.0 if face % 24 < 12 else 1.0)
+        weights = np.where(np.arange(288) % 24 < 12, 10.0, 1.0)
+        halves = np.bincount(tree.labels(1), weights)
+        self.assertLess(abs(halves[0] - halves[1]) / weights.sum(), 0.35, "imbalance of at most tau = 1")
+        with self.assertRaisesRegex(g.Error, "no face 288"):
+            tree.set_weight(288, 1)
+
+    def test_by_angles_borders_lie_on_creases(self):
+        vertices, faces = sheet(fold=2.0)
+        clusters = g.FaceClusters(vertices, faces, clusters=2, lambda_=0, metric="schlafman")
+        clusters.run()
+        left = vertices[faces].mean(1)[:, 0] < 6
+        self.assertFalse(set(clusters.labels[left]) & set(clusters.labels[~left]))
+        other = [g.FaceClusters(vertices, faces, clusters=5, random_seeds=seed) for seed in (1, 1, 2)]
+        for clusters in other:
+            clusters.run(2)
+        self.assertEqual(list(other[0].labels), list(other[1].labels))
+        self.assertNotEqual(list(other[0].labels), list(other[2].labels))
+
+    def test_make_an_atlas_that_is_true_to_planes(self):
+        vertices, faces = sheet(fold=1.0)
+        labels = (vertices[faces].mean(1)[:, 0] > 6).astype(np.uint32)
+        corners, turned_away = g.texture_atlas(vertices, faces, labels)
+        self.assertEqual(turned_away, 0)
+        self.assertTrue(corners.min() >= 0 and corners.max() <= 1)
+        edges = np.linalg.norm(vertices[faces] - np.roll(vertices[faces], 1, 1), axis=2)
+        ratio = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2) / edges
+        np.testing.assert_allclose(ratio, ratio[0, 0], rtol=1e-9)
+        with self.assertRaisesRegex(g.Error, "gap"):
+            g.texture_atlas(vertices, faces, labels, 1)
+
     def test_refuse_by_name(self):
         vertices, faces = sheet(2)
         for make, says in ((lambda: g.FaceClusters(vertices, faces + 5), ""), (lambda: g.FaceClusters(vertices[:, :2], faces), "vertices"),

@@ -263,6 +263,42 @@ class GeometryCommand(unittest.TestCase):
         halves = [sum(w for w, label in zip(weights, labels) if label == k) for k in (0, 1)]
         self.assertLess(abs(halves[0] - halves[1]), 0.2 * sum(halves))
 
+    def test_an_atlas_and_boxes_of_the_last_frame_are_written(self):
+        frames = [self.grid(f"sheet{i}.obj", i) for i in range(2)]
+        atlas, out = self.folder / "atlas.obj", self.folder / "out"
+        done = run("recluster", *frames, "--clusters", 4, "--atlas", atlas, "--boxes", "--out", out, "--no-pictures")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        lines = [line.split() for line in atlas.read_text().splitlines()]
+        uv = [[float(v) for v in line[1:]] for line in lines if line[0] == "vt"]
+        places = [[float(v) for v in line[1:]] for line in lines if line[0] == "v"]
+        faces = [[[int(k) - 1 for k in corner.split("/")] for corner in line[1:]] for line in lines if line[0] == "f"]
+        self.assertEqual((len(faces), len(uv), len(places)), (288, 864, 169))
+        self.assertTrue(all(0 <= v <= 1 for p in uv for v in p))
+        labels = [int(v) for v in (out / "frame_0001.csv").read_text().split()]
+        boxes = {int(row[0]): row[1:] for row in ([float(v) for v in line.split(",")] for line in (out / "frame_0001_boxes.csv").read_text().splitlines()[1:])}
+        for label, face in zip(labels, faces):
+            for v, _ in face:
+                self.assertTrue(all(boxes[label][k] - 1e-6 <= places[v][k] <= boxes[label][3 + k] + 1e-6 for k in range(3)))
+        self.assertIn("4 charts", done.stdout)
+        self.refused("recluster", *frames, "--atlas", self.folder / "no/where.obj", says=["where.obj"])
+
+    def test_metrics_seeds_filters_and_discs_are_options(self):
+        sheet = self.grid("sheet.obj", 1.0)
+        labels = {}
+        for name, options in (("eq8", ()), ("eq9", ("--metric", "schlafman", "--lambda", 0.2)), ("random", ("--random-seeds", 5)),
+                              ("tree", ("--method", "tree", "--level", 3)), ("bloom", ("--method", "tree", "--level", 3, "--bloom-bits", 128)),
+                              ("discs", ("--method", "tree", "--level", 3, "--simply-connected"))):
+            done = run("recluster", sheet, "--frames", 1, "--clusters", 8, "--out", self.folder / name, "--no-pictures", *options)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            labels[name] = (self.folder / name / "frame_0000.csv").read_text().split()
+            self.assertEqual(len(set(labels[name])), 8, name)
+            if name == "discs":
+                self.assertIn("287 discs, 0 with holes", done.stdout)
+        self.assertEqual(len({tuple(labels[k]) for k in ("eq8", "eq9", "random")}), 3)
+        self.assertNotEqual(labels["tree"], labels["bloom"])
+        self.refused("recluster", sheet, "--metric", "schlafman", "--lambda", 2, "--out", self.folder, says=["lambda is 2"])
+        self.refused("recluster", sheet, "--method", "tree", "--simply-connected", "--bloom-bits", 128, "--out", self.folder, says=["bloom_bits is 128"])
+
     def test_frames_that_do_not_fit_are_refused_by_name(self):
         a, b = self.grid("a.obj", 0), self.write("b.obj", ["v 0 0 0", "v 1 0 0", "v 0 1 0", "f 1 2 3"])
         self.refused("recluster", a, b, "--out", self.folder, says=["b.obj", "a.obj", "faces"])

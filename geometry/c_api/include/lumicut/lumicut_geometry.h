@@ -143,8 +143,11 @@ typedef struct lumicut_face_clusters_t* lumicut_face_clusters;
 typedef struct lumicut_face_clusters_desc {
   uint32_t struct_size; /* sizeof(lumicut_face_clusters_desc) */
   uint32_t clusters;    /* at least one a connected component is made; 0: 256 */
-  double lambda;        /* share of normals in the distance [Eq. 8]; negative: 1 */
+  double lambda;        /* of the distance [Eq. 8: 1 or more; Eq. 9: 0 to 1]; negative: 1 */
   double geodesic;      /* plain distance that is added where normals agree; negative: .001 */
+  uint32_t metric;      /* 0: by normals of clusters [Eq. 8]; 1: by angles between faces [Eq. 9] */
+  uint32_t random;      /* 1: first seeds at random, by `seed`, in place of bisection */
+  uint64_t seed;
 } lumicut_face_clusters_desc;
 /* `vertices`: 3 numbers each; `faces`: 3 indices each. desc may be NULL. */
 LUMICUT_GEOMETRY_API int lumicut_face_clusters_create(const double* vertices, size_t vertex_count,
@@ -168,8 +171,17 @@ LUMICUT_GEOMETRY_API int lumicut_face_tree_create(const double* vertices, size_t
                                                   size_t face_count, const double* weights, lumicut_face_tree* tree);
 LUMICUT_GEOMETRY_API void lumicut_face_tree_release(lumicut_face_tree tree);
 LUMICUT_GEOMETRY_API int lumicut_face_tree_set_weights(lumicut_face_tree tree, const double* weights); /* rebalances */
+/* One face's: its ancestors alone rebalance. */
+LUMICUT_GEOMETRY_API int lumicut_face_tree_set_weight(lumicut_face_tree tree, uint32_t face, double weight);
 /* Clusters of a level (the root is level 0), one label a face; imbalance: the tree's mean [Eq. 1]. Each may be NULL. */
 LUMICUT_GEOMETRY_API int lumicut_face_tree_read(lumicut_face_tree tree, int level, uint32_t* labels, double* imbalance);
+
+/* A texture atlas: a chart for each label, one a face, projected along its mean normal and packed into the unit square. corners: 6
+   numbers a face, x and y of its corners. gap: between charts, 0 to .1. turned_away: faces that look away from their chart; or
+   NULL. */
+LUMICUT_GEOMETRY_API int lumicut_texture_atlas(const double* vertices, size_t vertex_count, const uint32_t* faces,
+                                               size_t face_count, const uint32_t* labels, double gap, double* corners,
+                                               size_t* turned_away);
 
 /* ---- liblumicut_geometry_cgal (GPL) ---- */
 /* Points in every disk that holds epsilon of the weight. `weights`: NULL for all alike; `thesis` 1: Algorithm 6 in place of the
