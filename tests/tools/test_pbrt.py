@@ -253,7 +253,7 @@ class Pbrt(SceneFiles):
         for (y, x), wanted in (((0, 3), (1, 0, 0)), ((0, 0), (0, 1, 0)), ((3, 0), (0, 0, 1)), ((3, 3), (1, 1, 1))):
             np.testing.assert_allclose(found[y, x], wanted, atol=1e-4)
         # 60 degrees between the normal and the direction: half of each.
-        mix = f'AttributeBegin Rotate 60 0 1 0 Texture "t" "spectrum" "directionmix" "vector3 dir" [ 0 0 2 ] "rgb tex1" [ .8 0 0 ] "rgb tex2" [ 0 .8 0 ] AttributeEnd'
+        mix = 'AttributeBegin Rotate 60 0 1 0 Texture "t" "spectrum" "directionmix" "vector3 dir" [ 0 0 2 ] "rgb tex1" [ .8 0 0 ] "rgb tex2" [ 0 .8 0 ] AttributeEnd'
         np.testing.assert_allclose(self.square(mix, 'Material "diffuse" "texture reflectance" "t"')[0][1, 1], (0.4, 0.4, 0), atol=1e-5)
 
     def test_textures_of_numbers_and_of_colours_may_share_a_name(self):
