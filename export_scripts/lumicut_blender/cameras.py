@@ -66,7 +66,7 @@ def fit(render, camera_data):
 def set_panorama(out, camera, aspect, report):
     """Makes `out` the panorama of a camera; False where there is none of its kind. `aspect`: of the image."""
     data = camera.data
-    own = data if hasattr(data, "panorama_type") else data.cycles  # Blender 4.5 and later: its own
+    own = data if hasattr(data, "panorama_type") else data.cycles  # Blender 4.3 and later: its own
     kind = own.panorama_type
     if kind == "EQUIRECTANGULAR":
         out.panorama = library.EQUIRECTANGULAR

@@ -19,6 +19,10 @@ def pass_name(short):
     return LONG_PASS_NAMES[short] if bpy.app.version >= (5, 0, 0) else short
 
 
+# Normal Map of tangents: the strength scales what lies along the surface, and leaves some of the rest; 3.4 mixes normals,
+# which is the same for maps of unit length and strengths up to 1. Measured.
+NORMAL_MAPS_BY_SLOPE = bpy.app.version >= (4, 3, 0)
+NORMALS_BY_COFACTORS = bpy.app.version >= (4, 3, 0)  # in Vector Transform; 3.4 turns them as vectors. Measured
 FLAT_RECTS = bpy.app.version >= (4, 1, 0)  # pixels of passes are set as one row of numbers
 
 

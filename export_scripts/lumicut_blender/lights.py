@@ -22,7 +22,8 @@ AREA_TYPES = {"SQUARE": library.RECTANGLE, "RECTANGLE": library.RECTANGLE, "DISK
 AREA_IS_LAMBERTIAN = (4, 3, 0)
 # Measured against each version's Cycles: 3.x multiplies by the cosine to the axis, 4.x no longer does.
 SPOT_WITHOUT_COSINE = (4, 0, 0)
-# Read in the sources of both: before 4.0 lamps are disks that face each point, since then spheres. Measured against each.
+# Read in the sources of both: before 4.0 lamps are disks that face each point, since then spheres, but for those of a soft
+# falloff, which came with 4.1 and is what new lamps have. Measured against 3.4.1 and 4.3.2.
 LAMPS_ARE_SPHERES = (4, 0, 0)
 # Measured: 3.4.1 interpolates IES files around the full circle, 4.3.2 takes 0 beyond 0 and 360 degrees, which makes them
 # up to 1/16 brighter in their first and last interval, and files that are the same all around 1/8.
@@ -234,7 +235,7 @@ def convert_light(name, light, matrix, images, report, profiles):
         out.radius = min(light.angle / 2, math.pi / 2)
         return out
     out.radius = light.shadow_soft_size
-    if out.radius > 0 and bpy.app.version < LAMPS_ARE_SPHERES:
+    if out.radius > 0 and (bpy.app.version < LAMPS_ARE_SPHERES or getattr(light, "use_soft_falloff", False)):
         out.flags |= library.FACING_DISK
     if light.type == "SPOT":
         out.angle = min(light.spot_size, math.pi)

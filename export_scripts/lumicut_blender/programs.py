@@ -7,6 +7,7 @@ Numbers, vectors and colours are all three numbers; a single one stands in all t
 import numpy as np
 
 from .lumicut import library
+from .compat import NORMAL_MAPS_BY_SLOPE, NORMALS_BY_COFACTORS
 from .images import Picture
 from .mappings import Mapping
 from .scene_data import Program
@@ -454,6 +455,11 @@ class Compiler:
     def _normal_map(self, node, output, stack):
         colour, strength = self.get(node, stack, "Color"), self.get(node, stack, "Strength")
         if node.space == "TANGENT":
+            if NORMAL_MAPS_BY_SLOPE and not strength.is_number(1):
+                share = clamp(strength)
+                n = vector_math("MULTIPLY", vector_math("MULTIPLY_ADD", colour, const(2), const(-1)), combine(strength, strength, share))
+                n = vector_math("ADD", n, combine(ZERO, ZERO, complement(share)))
+                colour, strength = vector_math("MULTIPLY_ADD", n, HALF, HALF), ONE
             return Expr("normal_map", 1, (colour, strength), ("uv", node.uv_map), mean=0)
         n = vector_math("MULTIPLY_ADD", colour, const(2), const(-1))
         if node.space.startswith("BLENDER"):
@@ -732,7 +738,7 @@ class Compiler:
 
     def _vect_transform(self, node, output, stack):
         value = self.get(node, stack, "Vector")
-        mode = 0 if node.vector_type == "POINT" else 1  # Cycles turns normals as vectors
+        mode = {"POINT": 0, "VECTOR": 1, "NORMAL": 2 if NORMALS_BY_COFACTORS else 1}[node.vector_type]
         spaces = node.convert_from, node.convert_to
         if "CAMERA" in spaces:
             raise CannotCompile("Vector Transform of the camera")

@@ -59,7 +59,9 @@ class Panoramas(unittest.TestCase):
 
     def test_others_are_listed(self):
         scene = h.new_scene(8, 8)
-        scene.camera.data.type, scene.camera.data.cycles.panorama_type = "PANO", "MIRRORBALL"
+        data = scene.camera.data
+        data.type = "PANO"
+        (data if hasattr(data, "panorama_type") else data.cycles).panorama_type = "MIRRORBALL"
         with h.quiet():
             h.set_lumicut(vpls=10)
             h.render()
