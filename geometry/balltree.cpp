@@ -242,7 +242,19 @@ uint32_t BallTree::build_top_down(std::vector<uint32_t>& nodes) {
 }
 
 uint32_t BallTree::build_bottom_up(std::span<const double> centres, std::span<const double> radii) {
-  std::vector<float> c(centres.begin(), centres.end()), r(leaves_, 0.0f);
+  // Numbers that are single-precision ones stay. Of others it is places in the middle of all that are rounded, so that
+  // what is far from the origin is as exact as what is near it.
+  std::vector<double> middle(static_cast<size_t>(dim_), 0.0);
+  const auto rounds = [](double x) { return static_cast<double>(static_cast<float>(x)) != x; };
+  if (std::any_of(centres.begin(), centres.end(), rounds))
+    for (size_t j = 0; j < middle.size(); ++j) {
+      double lo = centres[j], hi = lo;
+      for (size_t i = j; i < centres.size(); i += middle.size())
+        lo = std::min(lo, centres[i]), hi = std::max(hi, centres[i]);
+      middle[j] = lo + 0.5 * (hi - lo);
+    }
+  std::vector<float> c(centres.size()), r(leaves_, 0.0f);
+  for (size_t i = 0; i < c.size(); ++i) c[i] = static_cast<float>(centres[i] - middle[i % middle.size()]);
   for (size_t i = 0; i < radii.size(); ++i) r[i] = static_cast<float>(radii[i]);
   const auto merges = agglomerate_balls(c, r, dim_, Strategy::parallel);
   std::vector<uint32_t> node_of(leaf_node_);

@@ -1,7 +1,7 @@
 // Ball trees: binary trees over balls in any dimension, every node bounded by a ball. [Omohundro 1989]
 //
 // Departs: bottom-up goes through accel/agglomerate.h (the same greedy pairs as the paper's brute force) on
-// single-precision leaves; volumes are compared by radius where one decides alone, and r^d appears in sums only;
+// single-precision leaves, rounded from the middle of all where they have to be; volumes are compared by radius where one decides alone, and r^d appears in sums only;
 // top-down takes an explicit stack, for its depth can be near N; balls of inner nodes are widened by a few roundings,
 // so that pruning never loses a leaf.
 #pragma once

@@ -1,7 +1,8 @@
 // Ball trees: volume and building time of the five builders on the paper's data (Omohundro 1989, figures 3-22), and
 // nearest neighbours beside nanoflann and CGAL.
 //
-//   bench_balltree            both parts;   bench_balltree volumes | neighbours | figures   one of them
+//   bench_balltree            all parts;   bench_balltree volumes | neighbours | figures   one of them
+//   bench_balltree curves     figures 7-22 as CSV; bench/geometry/balltree_curves.py draws them
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -93,6 +94,29 @@ void volumes() {
       std::printf("%-8s %2d %8.2f s, volume %.3f of kd's\n", kind, d, s, volume / kd);
       std::fflush(stdout);
     }
+}
+
+// Figures 7-22.
+void curves() {
+  const char* names[] = {"kd", "insertion", "cheap insertion", "top-down", "bottom-up"};
+  std::printf("data,dimension,leaves,builder,volume,seconds\n");
+  for (const int d : {2, 5, 10})
+    for (const char* kind : {"uniform", "cantor", "curve", "balls"})
+      for (const size_t n : {20, 50, 100, 200, 500, 1000, 2000, 5000}) {
+        if (n > sized<size_t>(5000, 50)) break;
+        const Data data = make(kind, n, d, 1);
+        for (int b = 0; b < 5; ++b) {
+          double volume = 0, spent = 0;
+          int builds = 0;  // short ones again and again
+          do {
+            spent +=
+                time_of([&] { volume = BallTree::build(data.centres, data.radii, d, kBuilders[b]).total_volume(); });
+            ++builds;
+          } while (spent < sized(0.02, 0.0) && builds < 1000);
+          std::printf("%s,%d,%zu,%s,%.6g,%.4g\n", kind, d, n, names[b], volume, spent / builds);
+        }
+        std::fflush(stdout);
+      }
 }
 
 // Figures 3-5: brute force against the clever construction.
@@ -227,6 +251,7 @@ void neighbours() {
 
 int main(int argc, char** argv) {
   using namespace lumicut::bench;
+  if (argc > 1 && !std::strcmp(argv[1], "curves")) return curves(), 0;
   print_header("Ball trees", argc, argv, 1);
   const auto wanted = [&](const char* part) { return argc < 2 || !std::strcmp(argv[1], part); };
   if (wanted("figures")) figures();

@@ -165,6 +165,27 @@ TEST(BallTree, BottomUpHasTheVolumeOfGreedyOverAllPairs) {
     }
 }
 
+// Far from the origin, where single precision has steps as large as the distances between the balls. Steps of 2^-20
+// around 2^24 are exact in double precision, and so are the differences.
+TEST(BallTree, BottomUpIsAsGoodFarFromTheOrigin) {
+  for (const int dim : {2, 5})
+    for (uint64_t seed = 0; seed < 4; ++seed) {
+      Rng rng(seed, Stage::test, 8);
+      Balls b;
+      b.dim = dim;
+      for (size_t i = 0; i < 120; ++i) {
+        for (int j = 0; j < dim; ++j) b.centres.push_back(rng.next_below(1u << 20) * 0x1p-20);
+        b.radii.push_back(0);
+      }
+      const double expected = greedy_volume(b);
+      for (double& x : b.centres) x += 0x1p24;
+      const BallTree t = BallTree::build(b.centres, b.radii, dim, BallTreeBuilder::bottom_up);
+      EXPECT_TRUE(t.valid());
+      // Inner balls are widened by roundings of their coordinates, 4e-9 here, of radii from .01.
+      EXPECT_NEAR(t.total_volume() / expected, 1.0, 1e-5) << "dim " << dim << " seed " << seed;
+    }
+}
+
 TEST(BallTree, TinyBallsInTenDimensionsDoNotVanish) {
   Balls b = random_balls(3, 100, 10, false);
   for (double& x : b.centres) x *= 1e-4;
