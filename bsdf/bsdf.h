@@ -85,15 +85,15 @@ class Bsdf {
   // Of a path behind the first surface that lights are sampled at: straight through glass, where shadows pass.
   PathChoice choose(Rng& rng) const;
   // What absorbs a ray that leaves by a sample with such flags, for each unit of length; `before`: what absorbed the one
-  // that came. Glass inside glass ends the outer one's.
+  // that came. Glass inside glass absorbs beside the outer one.
   Rgb absorption_after(uint32_t flags, const Rgb& before) const {
-    if ((flags & kTransmitted) != 0) return behind_ ? Rgb{} : parameters_.absorption;
-    return behind_ ? parameters_.absorption : before;
+    const Rgb here = absorption_to(before);
+    if ((flags & kTransmitted) == 0) return here;
+    return behind_ ? here - parameters_.absorption : here + parameters_.absorption;
   }
-  // Share of light that is left after `distance` on the way to this surface: through its own glass where it is seen from
-  // inside, whatever is known of where the ray set out, else through that. [Beer, Lambert]
+  // Share of light that is left after `distance` on the way to this surface. [Beer, Lambert]
   Rgb transmittance_to(float distance, const Rgb& before) const {
-    const Rgb& a = behind_ && max_component(parameters_.absorption) > 0.0f ? parameters_.absorption : before;
+    const Rgb a = absorption_to(before);
     if (!(max_component(a) > 0.0f)) return {1, 1, 1};
     return {std::exp(-a.x * distance), std::exp(-a.y * distance), std::exp(-a.z * distance)};
   }
@@ -101,6 +101,8 @@ class Bsdf {
   bool passes_straight() const { return specular_ && parameters_.shadows_pass; }
 
  private:
+  // On the way to this surface: seen from inside, at least its own, whatever is known of where the ray set out.
+  Rgb absorption_to(const Rgb& before) const { return behind_ ? max(before, parameters_.absorption) : before; }
   std::optional<ScatterSample> scatter_cosine(Rng& rng) const;
   void add_other_side();
   size_t layer_at(const std::array<float, 3>& shares, float choice) const;

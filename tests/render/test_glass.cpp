@@ -191,6 +191,31 @@ TEST(TintedGlass, ASlabShowsWhatIsBehindItByBeersLaw) {
   }
 }
 
+// As a drink in its glass: where bodies overlap, both absorb.
+TEST(TintedGlass, ABodyInsideAnotherAbsorbsBesideIt) {
+  constexpr Rgb kOuter{0.5f, 1, 0}, kInner{0, 1, 2};
+  Scene scene({"bvh", true});
+  Material outer = test::diffuse(1, 1, 1), glowing = test::diffuse(0, 0, 0);
+  outer.lobe = LobeModel::ggx, outer.specular = {1, 1, 1}, outer.roughness = 0, outer.transmission = 1;
+  Material inner = outer;
+  outer.absorption = kOuter, inner.absorption = kInner, glowing.emission = {1, 1, 1};
+  scene.set_materials({glowing, outer, inner});
+  Mesh wall, whole, part;
+  test::add_quad(wall, {-5, -5, 0}, {5, -5, 0}, {5, 5, 0}, {-5, 5, 0}, 0);
+  test::add_box(whole, {-4, -4, 1}, {4, 4, 2}, 1, false), test::add_box(part, {-3, -3, 1.25f}, {3, 3, 1.75f}, 2, false);
+  scene.add_mesh(std::move(wall)), scene.add_mesh(std::move(whole)), scene.add_mesh(std::move(part));
+  const Rgb seen = TintedSlab::mean(scene, 0.1f, 3, 16, test::kSanitized ? 16 : 256);
+  const Rgb beyond = TintedSlab::mean(scene, 0.1f, 0.5f, 16, 1);  // nothing is in between
+  const double t = std::pow(1 - TintedSlab::kReflected, 4);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_EQ(beyond[k], 1) << k;
+    const double straight = t * std::exp(-1.0 * kOuter[k] - 0.5 * kInner[k]);
+    // What goes to and fro between the four borders: at most their six pairs of reflections, if nothing was absorbed.
+    EXPECT_GT(seen[k], straight - (test::kSanitized ? 0.02 : 0.004)) << k;
+    EXPECT_LT(seen[k], straight * (1 + 6 * 0.04 * 0.04 * 1.1) + (test::kSanitized ? 0.02 : 0.004)) << k;
+  }
+}
+
 // Shadow rays know the slab's thickness by its volume and area: here to the edges' 6 %, whatever the instance's size.
 TEST(TintedGlass, ASunThroughASlabIsDimmedByBeersLaw) {
   const auto lit = [](bool slab, float size) {
