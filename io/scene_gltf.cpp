@@ -63,6 +63,7 @@ class Reader {
     if (!done) throw FileError(path_, error.empty() ? "is no glTF 2.0 file" : one_line(error));
     if (!warning.empty()) scene_.warnings.add("warnings of the glTF reader", path_, one_line(warning));
     note_extensions();
+    for (gltf::Material& material : model_.materials) translate_glossiness(material);
     for (size_t m = 0; m < model_.materials.size(); ++m) read_material(m);
     Material plain;
     plain.name = "no material";
@@ -97,7 +98,8 @@ class Reader {
     static const std::set<std::string> kRead = {"KHR_lights_punctual",        "KHR_materials_emissive_strength",
                                                 "KHR_materials_transmission", "KHR_materials_ior",
                                                 "KHR_materials_clearcoat",    "KHR_materials_specular",
-                                                "KHR_texture_transform",      "EXT_mesh_gpu_instancing"};
+                                                "KHR_texture_transform",      "EXT_mesh_gpu_instancing",
+                                                "KHR_materials_volume",       "KHR_materials_pbrSpecularGlossiness"};
     for (const auto& name : model_.extensionsRequired)
       if (kRead.count(name) == 0) fail("extensionsRequired", fmt::format("{} is not supported", name));
     for (const auto& name : model_.extensionsUsed)
@@ -236,6 +238,41 @@ class Reader {
 
   // ---- Materials
 
+  // Diffuse and specular colours as base colour and share of metal, by the conversion that the extension's text gives.
+  void translate_glossiness(gltf::Material& m) {
+    const auto* from = extension(m.extensions, "KHR_materials_pbrSpecularGlossiness");
+    if (from == nullptr) return;
+    constexpr double kDielectric = 0.04, kLeast = 1e-6;
+    const auto brightness = [](const Vec& c) {
+      return std::sqrt(0.299 * c[0] * c[0] + 0.587 * c[1] * c[1] + 0.114 * c[2] * c[2]);
+    };
+    const Vec diffuse = vector_of(from, "diffuseFactor", {1, 1, 1}), f0 = vector_of(from, "specularFactor", {1, 1, 1});
+    const double rest = 1 - std::max({f0[0], f0[1], f0[2]}), d = brightness(diffuse), s = brightness(f0);
+    double metallic = 0;
+    if (s >= kDielectric) {
+      const double b = d * rest / (1 - kDielectric) + s - 2 * kDielectric, c = kDielectric - s;
+      metallic = (std::sqrt(std::max(0.0, b * b - 4 * kDielectric * c)) - b) / (2 * kDielectric);
+      metallic = std::clamp(metallic, 0.0, 1.0);
+    }
+    auto& pbr = m.pbrMetallicRoughness;
+    pbr.baseColorFactor = {1, 1, 1, 1};
+    for (size_t k = 0; k < 3; ++k) {
+      const double of_diffuse = diffuse[k] * rest / (1 - kDielectric) / std::max(1 - metallic, kLeast);
+      const double of_metal = (f0[k] - kDielectric * (1 - metallic)) / std::max(metallic, kLeast);
+      pbr.baseColorFactor[k] = std::clamp(of_diffuse + metallic * metallic * (of_metal - of_diffuse), 0.0, 1.0);
+    }
+    if (from->Has("diffuseFactor") && from->Get("diffuseFactor").IsArray() && from->Get("diffuseFactor").ArrayLen() > 3)
+      pbr.baseColorFactor[3] = from->Get("diffuseFactor").Get(3).GetNumberAsDouble();
+    pbr.metallicFactor = metallic;
+    pbr.roughnessFactor = 1 - number_of(from, "glossinessFactor", 1);
+    if (from->Has("diffuseTexture")) {
+      const gltf::Value& texture = from->Get("diffuseTexture");
+      pbr.baseColorTexture.index = index_of(&texture, "index", -1);
+      pbr.baseColorTexture.texCoord = index_of(&texture, "texCoord", 0);
+    }
+    if (from->Has("specularGlossinessTexture")) leave_out("textures of KHR_materials_pbrSpecularGlossiness's gloss");
+  }
+
   void read_material(size_t index) {
     const gltf::Material& from = model_.materials[index];
     Material out;
@@ -263,7 +300,17 @@ class Reader {
     m.ior = static_cast<float>(ior);
     m.transmission = share(number_of(extension(from.extensions, "KHR_materials_transmission"), "transmissionFactor", 0),
                            where + ".transmissionFactor");
-    if (m.transmission > 0) m.flags |= LUMICUT_SHADOWS_PASS;  // without KHR_materials_volume it is a thin sheet
+    const auto* volume = extension(from.extensions, "KHR_materials_volume");
+    if (number_of(volume, "thicknessFactor", 0) > 0) {
+      const double distance = number_of(volume, "attenuationDistance", 0);  // 0: not given, infinite
+      const Vec left = vector_of(volume, "attenuationColor", {1, 1, 1});
+      for (size_t k = 0; k < 3 && distance > 0; ++k) {
+        share(left[k], where + ".attenuationColor");
+        m.absorption[k] = static_cast<float>(std::min(-std::log(std::max(left[k], 1e-6)) / distance, 1e15));
+      }
+    } else if (m.transmission > 0) {
+      m.flags |= LUMICUT_SHADOWS_PASS;  // without a volume it is a thin sheet
+    }
     const auto* coat = extension(from.extensions, "KHR_materials_clearcoat");
     m.coat = share(number_of(coat, "clearcoatFactor", 0), where + ".clearcoatFactor");
     m.coat_roughness = share(number_of(coat, "clearcoatRoughnessFactor", 0), where + ".clearcoatRoughnessFactor");

@@ -175,6 +175,29 @@ class Gltf(cli.Cli):
         self.assertLess(len(hit), 32 * 32)
         self.assertGreater(min(image["B"]), 0)
 
+    def converted(self, material):
+        d = Document()
+        d.node(mesh=d.square(material))
+        d.json["extensionsUsed"] = d.json["extensionsRequired"] = list(material["extensions"])
+        self.assert_ends(lumicut("convert", d.write(self.folder / "a.gltf"), self.folder / "a.json"), OK)
+        return json.loads((self.folder / "a.json").read_text())["materials"][0]
+
+    def test_specular_and_gloss_become_metal_and_roughness(self):
+        for factors, base, metallic, roughness in (
+                ({"diffuseFactor": [0.6, 0.3, 0.1, 1], "specularFactor": [0.04] * 3, "glossinessFactor": 0.25}, (0.6, 0.3, 0.1), 0, 0.75),
+                ({"diffuseFactor": [0, 0, 0, 1], "specularFactor": [1, 0.8, 0.3], "glossinessFactor": 0.9}, (1, 0.8, 0.3), 1, 0.1)):
+            found = self.converted({"extensions": {"KHR_materials_pbrSpecularGlossiness": factors}})
+            for value, wanted in zip((*found["diffuse"], found.get("metallic", 0), found["roughness"]), (*base, metallic, roughness)):
+                self.assertAlmostEqual(value, wanted, delta=0.02)  # metals of a colour keep a little of the rest
+
+    def test_volumes_absorb_and_bend_light(self):
+        glass = {"KHR_materials_transmission": {"transmissionFactor": 1}}
+        self.assertIs(self.converted({"extensions": glass})["shadows_pass"], True)
+        found = self.converted({"extensions": glass | {"KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 2, "attenuationColor": [1, 0.5, 0.25]}}})
+        self.assertNotIn("shadows_pass", found)
+        for value, colour in zip(found["absorption"], (1, 0.5, 0.25)):
+            self.assertAlmostEqual(value, -math.log(colour) / 2, places=5)
+
     def test_what_is_left_out_is_named(self):
         d = Document()
         d.node(mesh=d.square({"emissiveFactor": [1, 1, 1]}))
