@@ -18,7 +18,8 @@ std::string inflate_all(const std::string& bytes, uint64_t from, uint64_t most, 
   z_stream stream{};
   if (inflateInit2(&stream, gzip ? 15 + 16 : 15) != Z_OK) throw FileError(path, "out of memory while it is unpacked");
   const std::unique_ptr<z_stream, int (*)(z_stream*)> owner(&stream, inflateEnd);
-  most = std::min(most, physical_memory() / 2);
+  // Meshes and scenes become five times as large, not hundreds.
+  most = std::min({most, physical_memory() / 2, (uint64_t{64} << 20) + 200 * bytes.size()});
   std::string out;
   uint64_t at = from;
   while (true) {

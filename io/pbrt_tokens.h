@@ -46,6 +46,7 @@ class PbrtTokens {
   std::string last_;
   int line_ = 1;
   uint64_t bytes_ = 0;
+  size_t opened_ = 0;
 };
 
 struct PbrtParameter {

@@ -337,7 +337,7 @@ class Pbrt(SceneFiles):
         (self.folder / "part.pbrt.gz").write_bytes(gzip.compress(b'Shape "plymesh" "string filename" "a.ply.gz"'))
         vertices, triangles = self.positions('Include "part.pbrt.gz"')
         np.testing.assert_allclose(np.sort(vertices, axis=0), np.sort([[0, 0, 0], [1, 0, 0], [0, 1, 0]], axis=0))
-        for broken in (gzip.compress(ply)[:-20], gzip.compress(b"ply\nnonsense"), b"\x1f\x8b\x08nonsense"):
+        for broken in (gzip.compress(ply)[:-20], gzip.compress(b"ply\nnonsense"), b"\x1f\x8b\x08nonsense", gzip.compress(bytes(1 << 28))):
             (self.folder / "a.ply.gz").write_bytes(broken)
             self.assert_ends(lumicut("render", self.folder / "shape.pbrt", "-o", self.folder / "x.exr"), BAD_FILE, "a.ply.gz")
 
@@ -353,10 +353,14 @@ class Pbrt(SceneFiles):
     def test_wrong_files_are_refused_with_file_and_line(self):
         good = self.floor("LightSource \"point\"").read_text()
         self.write("loop.pbrt", 'Include "loop.pbrt"')
+        for k in range(30):
+            self.write(f"twice{k}.pbrt", f'Include "twice{k + 1}.pbrt" Include "twice{k + 1}.pbrt"')
+        self.write("twice30.pbrt", "")
         os.mkfifo(self.folder / "pipe.pbrt")
         for change, texts in ((("WorldBegin", "WorldBegn"), ("line 4", "WorldBegn")), (("0 1 2 0 2 3", "0 1 2 0 2 9"), ("9", "4 vertices")),
                               (("fov\" 1", "fov\" x"), ("line 3", "\"x\"")), (("LookAt 0 4 0.001", "LookAt 0 0 0"), ("its own place",)),
                               (("WorldBegin", 'WorldBegin Include "loop.pbrt"'), ("loop.pbrt", "without end")),
+                              (("WorldBegin", 'WorldBegin Include "twice0.pbrt"'), ("without end",)),
                               (("WorldBegin", 'WorldBegin Include "pipe.pbrt"'), ("pipe.pbrt",)), (("WorldBegin", 'WorldBegin Include "none.pbrt"'), ("none.pbrt",)),
                               (("WorldBegin", "WorldBegin AttributeEnd"), ("AttributeEnd",)), (("WorldBegin", "WorldBegin AttributeBegin"), ("no end",)),
                               (("WorldBegin", 'WorldBegin ObjectInstance "a"'), ('"a"',)), (("\"float fov\" 1", "\"float fov\" ["), ("line 4", "WorldBegin", "finite number")),
