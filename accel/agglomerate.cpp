@@ -116,6 +116,69 @@ struct BallPolicy {
 };
 static_assert(agglomeration::ClusterPolicy<BallPolicy>);
 
+// A dissimilarity of the caller's: one call for up to eight clusters, without SIMD.
+struct CallerPolicy {
+  static constexpr bool kNonDecreasing = true;  // agglomerate_by() refuses strategies where it is not
+  static constexpr bool kUntrusted = true;
+  static constexpr int kFeatures = 0;
+  static constexpr int kOrderDims = 8;
+  const Dissimilarity& by;
+
+  size_t features() const { return by.features; }
+  size_t key_features() const { return by.key_features == 0 ? by.features : by.key_features; }
+  void merge(const float* a, const float* b, float* out) const {
+    by.merge(a, b, out);
+    for (size_t f = 0; f < by.features; ++f)
+      if (!(out[f] >= std::max(a[f], b[f]) && out[f] < std::numeric_limits<float>::infinity()))
+        fail_argument("agglomerate: feature " + std::to_string(f) + " of a joint cluster is " + std::to_string(out[f]) +
+                      ", not finite or below " + std::to_string(std::max(a[f], b[f])) + " of a part");
+  }
+  void order_point(const float* a, float* point) const {
+    std::fill_n(point, kOrderDims, 0.0f);
+    if (by.order) return by.order(a, point);
+    std::copy_n(a, std::min<size_t>(by.features, kOrderDims), point);
+  }
+  template <class D>
+  struct Query {
+    const float* a;
+  };
+  template <class D>
+  HWY_INLINE Query<D> query(D, const float* a) const {
+    return {a};
+  }
+  template <class D>
+  HWY_NOINLINE hn::Vec<D> cost(D d, const Query<D>& query, const float* b) const {
+    HWY_ALIGN float costs[8];
+    float rows[8 * agglomeration::kMaxFeatures], of_rows[8];
+    size_t count = 0, lane_of[8];
+    for (size_t lane = 0; lane < hn::Lanes(d); ++lane) {
+      costs[lane] = std::numeric_limits<float>::infinity();
+      if (b[lane] == costs[lane]) continue;  // no cluster
+      for (size_t f = 0; f < by.features; ++f) rows[count * by.features + f] = b[8 * f + lane];
+      lane_of[count++] = lane;
+    }
+    if (count > 0) by.cost(query.a, rows, count, of_rows);
+    for (size_t i = 0; i < count; ++i) {
+      if (std::isnan(of_rows[i])) fail_argument("agglomerate: a cost is NaN");
+      costs[lane_of[i]] = std::min(of_rows[i], std::numeric_limits<float>::max());
+    }
+    return hn::Load(d, costs);
+  }
+};
+static_assert(agglomeration::ClusterPolicy<CallerPolicy>);
+
+std::vector<Merge> caller(const Dissimilarity& by, std::span<const float> leaves, Strategy strategy,
+                          Progress* progress) {
+  const CallerPolicy policy{by};
+  const size_t n = leaves.size() / by.features;
+  agglomeration::Core<CallerPolicy> core(policy, n, strategy == Strategy::parallel, progress);
+  for (size_t i = 0; i < n; ++i)
+    std::copy_n(leaves.begin() + static_cast<std::ptrdiff_t>(i * by.features), by.features, core.leaf(i));
+  std::vector<Merge> merges = core.run(strategy);
+  if (merges.size() + 1 < n) fail_argument(agglomeration::kInconsistent);
+  return merges;
+}
+
 std::vector<Merge> boxes(std::span<const Aabb> input, float scale, float inflate, Strategy strategy,
                          Progress* progress) {
   const AreaPolicy policy;
@@ -157,6 +220,7 @@ namespace lumicut {
 
 HWY_EXPORT(boxes);
 HWY_EXPORT(balls);
+HWY_EXPORT(caller);
 
 std::vector<Merge> agglomerate_boxes(std::span<const Aabb> input, Strategy strategy, Progress* progress) {
   if (input.size() >= 0x7fffffffu) throw Error(ErrorCode::unsupported, "agglomerate: more than 2^31 boxes");
@@ -189,6 +253,30 @@ std::vector<Merge> agglomerate_balls(std::span<const float> centres, std::span<c
     if (!(radii[i] >= 0.0f && radii[i] < 1e18f))
       fail_argument("agglomerate_balls: radii[" + std::to_string(i) + "] is " + std::to_string(radii[i]));
   return HWY_DYNAMIC_DISPATCH(balls)(centres, radii, dimension, strategy, progress);
+}
+
+std::vector<Merge> agglomerate_by(const Dissimilarity& dissimilarity, std::span<const float> leaves, Strategy strategy,
+                                  Progress* progress) {
+  const Dissimilarity& d = dissimilarity;
+  if (d.features < 1 || d.features > 64)
+    fail_argument("agglomerate: " + std::to_string(d.features) + " features, not 1 to 64");
+  if (d.key_features > d.features)
+    fail_argument("agglomerate: key_features is " + std::to_string(d.key_features) + " of " +
+                  std::to_string(d.features) + " features");
+  if (!d.merge || !d.cost) fail_argument("agglomerate: no function to merge, or none of costs");
+  if (!d.non_decreasing && (strategy == Strategy::locally_ordered || strategy == Strategy::parallel))
+    fail_argument(
+        "agglomerate: locally ordered strategies need a dissimilarity that never falls as clusters grow (Eq. 1)");
+  if (leaves.size() % d.features != 0)
+    fail_argument("agglomerate: " + std::to_string(leaves.size()) + " numbers are no rows of " +
+                  std::to_string(d.features) + " features");
+  if (leaves.size() / d.features >= 0x7fffffffu)
+    throw Error(ErrorCode::unsupported, "agglomerate: more than 2^31 leaves");
+  for (size_t i = 0; i < leaves.size(); ++i)
+    if (!std::isfinite(leaves[i]))
+      fail_argument("agglomerate: feature " + std::to_string(i % d.features) + " of leaf " +
+                    std::to_string(i / d.features) + " is " + std::to_string(leaves[i]));
+  return HWY_DYNAMIC_DISPATCH(caller)(d, leaves, strategy, progress);
 }
 
 Strategy strategy_of(const std::string& name) {

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -43,6 +44,27 @@ std::vector<Merge> agglomerate_boxes(std::span<const Aabb> boxes, Strategy strat
 // below 0.
 std::vector<Merge> agglomerate_balls(std::span<const float> centres, std::span<const float> radii, int dimension,
                                      Strategy strategy, Progress* progress = nullptr);
+
+// A dissimilarity of the caller's own, on clusters that are vectors of features. Of a joint cluster none may be below
+// that of its parts (maxima and sums are not), and cost(a, b) must not fall when a feature of b rises: then it bounds
+// itself over many clusters, from the least of their features. Functions are called by several threads at a time with
+// Strategy::parallel. What they throw is passed on.
+struct Dissimilarity {
+  size_t features = 0;         // 1 to 64
+  size_t key_features = 0;     // leaves whose first so many are equal are joined beforehand; 0: all
+  bool non_decreasing = true;  // cost(a, b) <= cost(a, b ∪ c) [Eq. 1]; if not, naive and heap alone
+  // The features of a ∪ b, the same as of b ∪ a.
+  std::function<void(const float* a, const float* b, float* joint)> merge;
+  // Of a with each of `count` (1 to 8) others, rows of features; cost(a, b) is cost(b, a). Not NaN.
+  std::function<void(const float* a, const float* others, size_t count, float* costs)> cost;
+  // Up to eight coordinates (the rest is 0) by which clusters are sorted in space, for speed; none: the first features.
+  std::function<void(const float* a, float* point)> order;
+};
+
+// `leaves`: n rows of features, finite. Throws Error(invalid_argument) on values that are not and on what can be seen of
+// a dissimilarity that does not keep to the above: NaN, a joint feature below, costs that are not symmetric.
+std::vector<Merge> agglomerate_by(const Dissimilarity& dissimilarity, std::span<const float> leaves, Strategy strategy,
+                                  Progress* progress = nullptr);
 
 // "naive", "heap", "local", "parallel"; throws Error on any other name.
 Strategy strategy_of(const std::string& name);

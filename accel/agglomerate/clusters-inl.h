@@ -30,6 +30,9 @@ namespace lumicut::HWY_NAMESPACE::agglomeration {
 inline constexpr uint32_t kNone = 0xffffffffu;
 inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
+inline constexpr const char* kInconsistent =
+    "agglomerate: costs are not symmetric, or fall where they must not, so that there is no tree";
+
 // The leaves, the clusters made of them so far, and the merges that made them. A cluster is identified by one of its
 // leaves, whose features it replaces; node() gives its id in the tree.
 template <ClusterPolicy Policy>
@@ -55,6 +58,12 @@ class Clusters {
   bool threads() const { return threads_; }
   void check() const {
     if (progress_ != nullptr) progress_->check();
+  }
+
+  // What holds by itself where a policy keeps to its requirements, and is tested where that is not sure (kUntrusted).
+  void expect([[maybe_unused]] bool holds) const {
+    if constexpr (requires { Policy::kUntrusted; })
+      if (!holds) fail_argument(kInconsistent);
   }
 
   // fn(begin, end) over chunks of [0, n); in parallel when threads() is.

@@ -44,6 +44,7 @@ void merge_chains_within(Clusters<Policy>& clusters, BestMatchTree<Policy>& tree
     }
     const Link last = links.back();
     const uint32_t cluster = in_slot[last.slot];
+    clusters.expect(cluster != kNone);
     const Match match = tree.find(cluster, last.slot, last.match, top, outside);
     if (match.slot != last.match.slot) {
       if (match.slot < begin || match.slot >= end || is_stalled(match.slot)) {
@@ -57,6 +58,7 @@ void merge_chains_within(Clusters<Policy>& clusters, BestMatchTree<Policy>& tree
     if (match.slot == kNone) return;  // no other cluster
     if ((merges.size() & 0x3ff) == 0) clusters.check();
     const uint32_t into = match.slot;
+    clusters.expect(in_slot[into] != kNone && into != last.slot);
     links.resize(links.size() - 2);
     merges.push_back(
         clusters.join(in_slot[into], cluster, match.cost, first_id + static_cast<uint32_t>(merges.size())));

@@ -28,6 +28,16 @@ class FaceClustersDesc(ctypes.Structure):
                 ("random", c_uint32), ("seed", c_uint64)]
 
 
+_MERGE = ctypes.CFUNCTYPE(None, c_void_p, POINTER(c_float), POINTER(c_float), POINTER(c_float))
+_COST = ctypes.CFUNCTYPE(None, c_void_p, POINTER(c_float), POINTER(c_float), c_size_t, POINTER(c_float))
+_ORDER = ctypes.CFUNCTYPE(None, c_void_p, POINTER(c_float), POINTER(c_float))
+
+
+class Dissimilarity(ctypes.Structure):
+    _fields_ = [("struct_size", c_uint32), ("features", c_uint32), ("key_features", c_uint32), ("may_decrease", c_uint32),
+                ("user", c_void_p), ("merge", _MERGE), ("cost", _COST), ("order", _ORDER)]
+
+
 class HittingSetInfo(ctypes.Structure):
     _fields_ = [("lower_bound", c_size_t), ("empty_disks", c_size_t), ("greedy", c_size_t)]
 
@@ -42,6 +52,7 @@ FUNCTIONS = {
     "indices_release": (None, [c_void_p]),
     "indices_create": (c_int, [_INDICES, c_size_t, POINTER(c_void_p)]),
     "agglomerate": (c_int, [POINTER(c_float), c_size_t, c_int, c_int, _INDICES, POINTER(c_float)]),
+    "agglomerate_by": (c_int, [POINTER(Dissimilarity), POINTER(c_float), c_size_t, c_int, _INDICES, POINTER(c_float)]),
     "balltree_create": (c_int, [_DOUBLES, _DOUBLES, c_size_t, c_int, c_int, POINTER(c_void_p)]),
     "balltree_release": (None, [c_void_p]),
     "balltree_insert": (c_int, [c_void_p, _DOUBLES, c_double, c_int, _INDICES]),
@@ -173,6 +184,45 @@ def agglomerate(items, radii=None, strategy="local"):
     merges, costs = np.empty((count, 2), np.uint32), np.empty(count, np.float32)
     _check(_geometry().lumicut_agglomerate(_pointer(array, c_float), len(array), dimension, _choice(strategy, STRATEGIES, "strategy"),
                                            _pointer(merges, c_uint32), _pointer(costs, c_float)))
+    return merges, costs
+
+
+def agglomerate_by(leaves, merge, cost, may_decrease=False, key_features=0, strategy="local"):
+    """(merges, costs) by a dissimilarity of your own. leaves (n, features), float32. merge(a, b) gives the features of both together, none
+    below those of a or b; cost(a, others) one number for each row of others, which must not fall when a feature rises, nor (unless
+    may_decrease, with strategies naive and heap) as clusters grow. Called some hundred times a leaf: for thousands, not millions."""
+    leaves = np.ascontiguousarray(leaves, np.float32)
+    if leaves.ndim != 2 or not 1 <= leaves.shape[1] <= 64:
+        raise Error(f"leaves: an array (n, features) of 1 to 64 features is wanted, not {leaves.shape}")
+    count, width, raised = len(leaves), leaves.shape[1], []
+
+    def shielded(function):
+        def call(*arguments):
+            try:
+                if not raised:  # the first one ends it: what follows is NaN
+                    return function(*arguments)
+            except BaseException as error:
+                raised.append(error)
+            arguments[-1][0] = float("nan")
+        return call
+
+    def row(pointer, rows=None):
+        return np.ctypeslib.as_array(pointer, (width,) if rows is None else (rows, width))
+
+    def merged(_, a, b, joint):
+        row(joint)[:] = merge(row(a), row(b))
+
+    def costs_of(_, a, others, n, out):
+        np.ctypeslib.as_array(out, (n,))[:] = cost(row(a), row(others, n))
+
+    by = Dissimilarity(ctypes.sizeof(Dissimilarity), width, key_features, may_decrease, None, _MERGE(shielded(merged)), _COST(shielded(costs_of)),
+                       _ORDER())
+    merges, costs = np.empty((max(0, count - 1), 2), np.uint32), np.empty(max(0, count - 1), np.float32)
+    code = _geometry().lumicut_agglomerate_by(byref(by), _pointer(leaves, c_float), count, _choice(strategy, STRATEGIES, "strategy"),
+                                              _pointer(merges, c_uint32), _pointer(costs, c_float))
+    if raised:
+        raise raised[0]
+    _check(code)
     return merges, costs
 
 

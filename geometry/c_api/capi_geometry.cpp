@@ -125,6 +125,32 @@ int lumicut_agglomerate(const float* items, size_t count, int dimension, int str
   });
 }
 
+int lumicut_agglomerate_by(const lumicut_dissimilarity* dissimilarity, const float* leaves, size_t count, int strategy,
+                           uint32_t* merges, float* costs) {
+  return guard([&] {
+    const lumicut_dissimilarity& d = required(dissimilarity, "dissimilarity");
+    if (d.struct_size != sizeof(lumicut_dissimilarity))
+      fail_argument("lumicut_dissimilarity.struct_size is " + std::to_string(d.struct_size) + ", not " +
+                    std::to_string(sizeof(lumicut_dissimilarity)));
+    if (strategy < 0 || strategy > LUMICUT_AGGLOMERATE_PARALLEL)
+      fail_argument("strategy " + std::to_string(strategy) + " is not in 0 to 3");
+    if (d.may_decrease > 1)
+      fail_argument("lumicut_dissimilarity.may_decrease is " + std::to_string(d.may_decrease) + ", not 0 or 1");
+    required(d.merge, "merge"), required(d.cost, "cost");
+    Dissimilarity by;
+    by.features = d.features, by.key_features = d.key_features, by.non_decreasing = d.may_decrease == 0;
+    by.merge = [&d](const float* a, const float* b, float* joint) { d.merge(d.user, a, b, joint); };
+    by.cost = [&d](const float* a, const float* others, size_t n, float* out) { d.cost(d.user, a, others, n, out); };
+    if (d.order != nullptr) by.order = [&d](const float* a, float* point) { d.order(d.user, a, point); };
+    const auto list = agglomerate_by(by, array(leaves, count, d.features, "leaves"), static_cast<Strategy>(strategy));
+    if (!list.empty()) required(merges, "merges");
+    for (const Merge& m : list) {
+      *merges++ = m.left, *merges++ = m.right;
+      if (costs != nullptr) *costs++ = m.cost;
+    }
+  });
+}
+
 int lumicut_balltree_create(const double* centres, const double* radii, size_t count, int dimension, int builder,
                             lumicut_balltree* tree) {
   return guard([&] {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <stdexcept>
 
 #include "accel/agglomerate-inl.h"
 #include "clustering/light_policy.h"
@@ -121,6 +122,106 @@ TEST(Agglomerate, AllStrategiesBuildTheGreedyTreeOfBalls) {
     for (const Strategy s : kFast)
       EXPECT_EQ(agglomerate_balls(centres, radii, dimension, s), naive) << dimension << " " << static_cast<int>(s);
   }
+}
+
+// Joint boxes by half their area, as a caller would have them.
+Dissimilarity areas() {
+  Dissimilarity d;
+  d.features = 6;
+  d.merge = [](const float* a, const float* b, float* joint) {
+    for (int f = 0; f < 6; ++f) joint[f] = std::max(a[f], b[f]);
+  };
+  d.cost = [](const float* a, const float* others, size_t count, float* costs) {
+    for (size_t i = 0; i < count; ++i, others += 6) {
+      const float x = std::max(a[0], others[0]) + std::max(a[3], others[3]),
+                  y = std::max(a[1], others[1]) + std::max(a[4], others[4]),
+                  z = std::max(a[2], others[2]) + std::max(a[5], others[5]);
+      costs[i] = x * (y + z) + y * z;
+    }
+  };
+  d.order = [](const float* a, float* point) {
+    for (int axis = 0; axis < 3; ++axis) point[axis] = a[3 + axis] - a[axis];
+  };
+  return d;
+}
+std::vector<float> rows_of(std::span<const Aabb> boxes) {
+  std::vector<float> rows;
+  for (const Aabb& b : boxes) {
+    for (int axis = 0; axis < 3; ++axis) rows.push_back(-b.lo[axis]);
+    for (int axis = 0; axis < 3; ++axis) rows.push_back(b.hi[axis]);
+  }
+  return rows;
+}
+
+TEST(Agglomerate, ByTheCallersDissimilarityAllStrategiesBuildTheGreedyTree) {
+  const auto boxes = boxes_of(test::random_soup(1500, 0.05f, 21));
+  const std::vector<float> rows = rows_of(boxes);
+  Dissimilarity d = areas();
+  const auto greedy = agglomerate_by(d, std::span(rows).first(6 * 250), Strategy::naive);
+  const auto chain = agglomerate_by(d, rows, Strategy::locally_ordered);
+  for (const bool ordered : {true, false}) {
+    if (!ordered) d.order = nullptr;
+    for (const Strategy s : {Strategy::heap, Strategy::locally_ordered, Strategy::parallel}) {
+      EXPECT_EQ(agglomerate_by(d, std::span(rows).first(6 * 250), s), greedy);
+      EXPECT_EQ(agglomerate_by(d, rows, s), chain);
+    }
+  }
+}
+
+// Said to be one that may fall.
+TEST(Agglomerate, ByADissimilarityThatMayFallTheHeapAloneServes) {
+  Dissimilarity d = areas();
+  d.non_decreasing = false;
+  const std::vector<float> rows = rows_of(boxes_of(test::random_soup(100, 0.05f, 3)));
+  EXPECT_EQ(agglomerate_by(d, rows, Strategy::heap), agglomerate_by(d, rows, Strategy::naive));
+  EXPECT_THROW(agglomerate_by(d, rows, Strategy::locally_ordered), Error);
+  EXPECT_THROW(agglomerate_by(d, rows, Strategy::parallel), Error);
+}
+
+TEST(Agglomerate, ADissimilarityThatBreaksItsWordEndsInAnError) {
+  const std::vector<float> rows = rows_of(boxes_of(test::random_soup(3000, 0.05f, 4)));
+  const auto message = [&](const Dissimilarity& d, Strategy s) -> std::string {
+    try {
+      agglomerate_by(d, rows, s);
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ErrorCode::invalid_argument);
+      return e.what();
+    }
+    return "";
+  };
+  for (const Strategy s : {Strategy::naive, Strategy::heap, Strategy::locally_ordered, Strategy::parallel}) {
+    if (s == Strategy::naive) continue;  // O(N³)
+    Dissimilarity d = areas();
+    d.cost = [](const float*, const float*, size_t count, float* costs) {
+      std::fill_n(costs, count, std::numeric_limits<float>::quiet_NaN());
+    };
+    EXPECT_NE(message(d, s).find("NaN"), std::string::npos);
+    d = areas();
+    d.merge = [](const float*, const float*, float* joint) { std::fill_n(joint, 6, -1e9f); };
+    EXPECT_NE(message(d, s).find("feature 0 of a joint cluster"), std::string::npos);
+    // Not symmetric, and bounds that bound nothing: a tree all the same, or an error; no crash, no hang.
+    for (uint64_t seed = 0; seed < 20; ++seed) {
+      d = areas();
+      d.cost = [seed](const float* a, const float* others, size_t count, float* costs) {
+        for (size_t i = 0; i < count; ++i)
+          costs[i] = static_cast<float>(
+              hash64(std::bit_cast<uint32_t>(a[0]), std::bit_cast<uint32_t>(others[6 * i]) + seed) % 1000);
+      };
+      message(d, s);
+    }
+    // What a function throws comes out.
+    d.cost = [](const float*, const float*, size_t, float*) { throw std::out_of_range("mine"); };
+    EXPECT_THROW(agglomerate_by(d, rows, s), std::out_of_range);
+  }
+  Dissimilarity d = areas();
+  EXPECT_THROW(agglomerate_by(d, std::vector<float>(7), Strategy::heap), Error);
+  EXPECT_THROW(agglomerate_by(d, std::vector<float>(6, std::numeric_limits<float>::infinity()), Strategy::heap), Error);
+  d.features = 65;
+  EXPECT_THROW(agglomerate_by(d, {}, Strategy::heap), Error);
+  d.features = 6, d.key_features = 7;
+  EXPECT_THROW(agglomerate_by(d, {}, Strategy::heap), Error);
+  d.key_features = 0, d.merge = nullptr;
+  EXPECT_THROW(agglomerate_by(d, {}, Strategy::heap), Error);
 }
 
 TEST(Agglomerate, ParallelBuildsTheSerialTreeOnAnyNumberOfThreads) {

@@ -61,6 +61,44 @@ class Agglomeration(unittest.TestCase):
                 g.agglomerate(items, radii, strategy)
 
 
+class OwnDissimilarities(unittest.TestCase):
+    """Boxes (-lo, hi) by half their joint area, which `agglomerate` has too; and Manhattan distance of intervals' ends."""
+
+    def setUp(self):
+        rng = np.random.default_rng(8)
+        lo = rng.random((60, 3), np.float32)
+        self.boxes = np.column_stack([lo, lo + rng.random((60, 3), np.float32) * np.float32(0.2)])
+        self.leaves = np.column_stack([-self.boxes[:, :3], self.boxes[:, 3:]])
+
+    @staticmethod
+    def area(a, others):
+        x, y, z = (np.maximum(a[:3], others[:, :3]) + np.maximum(a[3:], others[:, 3:])).T
+        return x * (y + z) + y * z
+
+    def test_build_the_tree_of_the_area_of_boxes(self):
+        merges, costs = g.agglomerate(self.boxes)
+        for strategy in g.STRATEGIES:
+            own, own_costs = g.agglomerate_by(self.leaves, np.maximum, self.area, strategy=strategy)
+            np.testing.assert_array_equal(own, merges)
+            np.testing.assert_allclose(own_costs, costs, rtol=1e-4)   # ours widens boxes by 1e-7
+
+    def test_pass_on_what_their_functions_raise(self):
+        def fails(a, others):
+            raise KeyError("mine")
+        with self.assertRaisesRegex(KeyError, "mine"):
+            g.agglomerate_by(self.leaves, np.maximum, fails)
+        with self.assertRaisesRegex(g.Error, "NaN"):
+            g.agglomerate_by(self.leaves, np.maximum, lambda a, others: np.full(len(others), np.nan))
+        with self.assertRaisesRegex(g.Error, "joint cluster"):
+            g.agglomerate_by(self.leaves, np.minimum, self.area)
+        with self.assertRaisesRegex(g.Error, "locally ordered"):
+            g.agglomerate_by(self.leaves, np.maximum, self.area, may_decrease=True)
+        self.assertEqual(len(g.agglomerate_by(self.leaves, np.maximum, self.area, may_decrease=True, strategy="heap")[0]), 59)
+        with self.assertRaisesRegex(g.Error, "leaves"):
+            g.agglomerate_by(np.zeros(3), np.maximum, self.area)
+        self.assertEqual(len(g.agglomerate_by(np.zeros((0, 2)), np.maximum, self.area)[0]), 0)
+
+
 class BallTrees(unittest.TestCase):
     def setUp(self):
         rng = np.random.default_rng(3)
@@ -307,8 +345,8 @@ class Interface(unittest.TestCase):
                 wanted = plain.get(base, None)
                 if base == "char":
                     wanted, pointer = ctypes.c_char_p, False
-                elif base in ("lumicut_face_clusters_desc", "lumicut_hitting_set_info"):
-                    wanted = g.FaceClustersDesc if "desc" in base else g.HittingSetInfo
+                elif base in ("lumicut_face_clusters_desc", "lumicut_hitting_set_info", "lumicut_dissimilarity"):
+                    wanted = {"f": g.FaceClustersDesc, "h": g.HittingSetInfo, "d": g.Dissimilarity}[base.removeprefix("lumicut_")[0]]
                 elif wanted is None:
                     wanted = ctypes.c_void_p
                 self.assertIs(kind, ctypes.POINTER(wanted) if pointer else wanted, f"{name}: {argument}")

@@ -60,6 +60,26 @@ enum {
 LUMICUT_GEOMETRY_API int lumicut_agglomerate(const float* items, size_t count, int dimension, int strategy,
                                              uint32_t* merges, float* costs);
 
+/* A dissimilarity of the caller's own, on clusters that are vectors of features. Of a joint cluster no feature may be below that
+   of its parts (maxima and sums are not), and a cost must not fall when a feature of the other cluster rises: it then serves as
+   its own bound. Called by several threads at a time where the strategy is parallel. */
+typedef struct lumicut_dissimilarity {
+  uint32_t struct_size;  /* sizeof(lumicut_dissimilarity) */
+  uint32_t features;     /* 1 to 64 */
+  uint32_t key_features; /* leaves whose first so many are equal are joined beforehand; 0: all */
+  uint32_t may_decrease; /* 1: cost(a, b) may be above cost(a, b and c) [Eq. 1]; strategies naive and heap alone */
+  void* user;            /* the first argument of the functions */
+  /* The features of a and b together, the same as of b and a. */
+  void (*merge)(void* user, const float* a, const float* b, float* joint);
+  /* Of a with each of `count` (1 to 8) others, rows of features; symmetric, and not NaN. */
+  void (*cost)(void* user, const float* a, const float* others, size_t count, float* costs);
+  /* Up to eight coordinates by which clusters are sorted in space, for speed alone; or NULL: the first features. */
+  void (*order)(void* user, const float* a, float* point);
+} lumicut_dissimilarity;
+/* leaves: `count` rows of features. merges and costs as above. */
+LUMICUT_GEOMETRY_API int lumicut_agglomerate_by(const lumicut_dissimilarity* dissimilarity, const float* leaves,
+                                                size_t count, int strategy, uint32_t* merges, float* costs);
+
 /* ---- Ball trees [Omohundro 1989] ---- */
 typedef struct lumicut_balltree_t* lumicut_balltree;
 enum {
