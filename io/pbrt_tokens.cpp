@@ -23,7 +23,8 @@ constexpr uint64_t kMostBytes = uint64_t{4} << 30;  // of all files together
 }  // namespace
 
 void PbrtTokens::open(const std::string& path) {
-  if (files_.size() >= kDeepest || ++opened_ > kMostFiles) throw FileError(path, "files include each other without end");
+  if (files_.size() >= kDeepest || ++opened_ > kMostFiles)
+    throw FileError(path, "files include each other without end");
   Source source{path, plain_text(unpacked(read_whole_file(path, kMostBytes), kMostBytes, path), path), 0, 1};
   bytes_ += source.text.size();
   if (bytes_ > kMostBytes) throw FileError(path, "the scene's files are too long together");
