@@ -432,16 +432,27 @@ uint32_t SceneBuilder::add_material(const std::string& name, const lumicut_mater
   return static_cast<uint32_t>(scene.materials.size() - 1);
 }
 
+std::optional<uint32_t> SceneBuilder::with_absorption(uint32_t material, const Vec& absorption) {
+  lumicut_material values = scene.materials.at(material).values;
+  if (!(values.transmission > 0) || (values.flags & LUMICUT_SHADOWS_PASS) != 0) return std::nullopt;
+  for (size_t k = 0; k < 3; ++k) values.absorption[k] = static_cast<float>(std::clamp(absorption[k], 0.0, 1e15));
+  return variant_of(material, values, ", which absorbs");
+}
+
 uint32_t SceneBuilder::with_emission(uint32_t material, const Vec& radiance, int32_t texture, bool both_sides) {
   lumicut_material values = scene.materials.at(material).values;
   for (size_t k = 0; k < 3; ++k) values.emission[k] = static_cast<float>(std::clamp(radiance[k], 0.0, 1e15));
   values.emission_texture = texture;
   if (both_sides) values.flags |= LUMICUT_EMIT_BOTH_SIDES;
+  return variant_of(material, values, ", which emits");
+}
+
+uint32_t SceneBuilder::variant_of(uint32_t material, const lumicut_material& values, const char* what) {
   for (size_t i = material + 1; i < scene.materials.size(); ++i)
     if (std::equal(reinterpret_cast<const char*>(&values), reinterpret_cast<const char*>(&values + 1),
                    reinterpret_cast<const char*>(&scene.materials[i].values)))
       return static_cast<uint32_t>(i);
-  return add_material(scene.materials[material].name + ", which emits", values);
+  return add_material(scene.materials[material].name + what, values);
 }
 
 void SceneBuilder::add(const std::string& name, const Geometry& geometry, const Affine& place, uint32_t material,

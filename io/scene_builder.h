@@ -105,6 +105,8 @@ class SceneBuilder {
   uint32_t add_material(const std::string& name, const lumicut_material& values);
   // The material with another emission.
   uint32_t with_emission(uint32_t material, const Vec& radiance, int32_t texture, bool both_sides);
+  // Glass that absorbs inside, by 1/length; nothing where the material is no glass.
+  std::optional<uint32_t> with_absorption(uint32_t material, const Vec& absorption);
   // The first where share is 0, the second where it is 1. What no single material can be is approximated, by name.
   uint32_t mix_materials(const std::string& name, uint32_t first, uint32_t second, const PaintRef& share);
 
@@ -129,6 +131,8 @@ class SceneBuilder {
   int32_t texture_of(const PaintRef& paint);
   int32_t add_program(Program program);
   void hide_emitters();
+  // The material of these values, made once of another one.
+  uint32_t variant_of(uint32_t material, const lumicut_material& values, const char* what);
   // What set_colour and set_number made these of.
   PaintRef colour_of(const float* factor, int32_t texture) const;
   PaintRef number_of(float factor, int32_t texture) const;

@@ -103,9 +103,7 @@ class Reader {
       integrator(node);
     } else if (name == "path") {
       build_.leave_out("<path>: files are searched for beside the scene");
-    } else if (name == "medium") {
-      build_.leave_out("media");
-    } else if (name == "sampler" || name == "bsdf" || name == "texture" || name == "spectrum") {
+    } else if (name == "medium" || name == "sampler" || name == "bsdf" || name == "texture" || name == "spectrum") {
       // read where they are used
     } else if (name == "emitter") {
       emitter(node);
@@ -180,7 +178,7 @@ class Reader {
     for (const Node& c : node.children()) {
       const std::string kind = c.name();
       if (kind == "medium" || (kind == "ref" && std::string(referred(c).name()) == "medium")) {
-        build_.leave_out("media");
+        if (asked.count(text(c, "name")) == 0) build_.leave_out("media");
         continue;
       }
       const bool value = kind != "bsdf" && kind != "ref" && kind != "emitter" && kind != "shape" && kind != "sampler" &&
@@ -683,6 +681,7 @@ class Reader {
         key.clear();
       }
     }
+    if (const Node inside = child(node, "interior")) material = filled(inside, material);
     tell_unread(node, {"to_world"});
     const std::string name = node.attribute("id") ? text(node, "id") : fmt::format("shape \"{}\"", kind);
     if (group.empty()) {
@@ -691,6 +690,22 @@ class Reader {
       groups_[group].push_back({std::move(all), place, material, flipped, name});
     }
     --depth_;
+  }
+  // Even media that glass holds: what they absorb.
+  uint32_t filled(const Node& medium, uint32_t material) {
+    std::optional<uint32_t> glass;
+    if (text(medium, "type") == "homogeneous") {
+      const Node extinction = child(medium, "sigma_t"), albedo = child(medium, "albedo");
+      const Vec all = extinction ? colour(extinction, false) : Vec{1, 1, 1};
+      const Vec scattered = albedo ? colour(albedo, false) : Vec{0.75, 0.75, 0.75};
+      Vec absorbed = all * number(medium, "scale", 1);
+      for (size_t k = 0; k < 3; ++k) absorbed[k] *= 1 - std::clamp(scattered[k], 0.0, 1.0);
+      glass = build_.with_absorption(material, absorbed);
+      if (glass && std::max({scattered[0], scattered[1], scattered[2]}) > 0)
+        build_.leave_out("scattering inside of glass");
+    }
+    if (!glass) build_.leave_out("media");
+    return glass.value_or(material);
   }
   std::vector<Geometry> serialized(const Node& node) {
     const std::string name = word(node, "filename", "");

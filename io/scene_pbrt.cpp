@@ -38,6 +38,7 @@ struct State {
   bool still = true;                       // transforms are those at the beginning of the frame
   uint32_t material = 0;
   std::optional<Parameters> area_light;
+  std::string inside;                           // the medium
   std::map<std::string, PbrtParameters> given;  // by Attribute to shapes, lights, materials ...
 };
 
@@ -201,23 +202,24 @@ class Reader {
       parameters();
       return;
     }
-    static const std::map<std::string, bool> kPassed = {
-        {"Sampler", false},    {"Integrator", false},     {"PixelFilter", false},   {"Accelerator", false},
-        {"ColorSpace", false}, {"MakeNamedMedium", true}, {"MediumInterface", true}};
-    const auto passed = kPassed.find(word);
+    static const std::set<std::string> kPassed = {"Sampler", "Integrator", "PixelFilter", "Accelerator", "ColorSpace"};
     if (word == "Texture") {
       const std::string name = quoted("Texture"), type = quoted("Texture"), kind = quoted("Texture");
       const Parameters p = parameters("texture");
       texture(name, type, kind, p);
       tell_unread(fmt::format("textures of the kind {}", kind), p);
     } else if (word == "MediumInterface") {
-      bool any = !quoted(word.c_str()).empty();
-      while (tokens_.peek() && tokens_.peek()->quoted) any = !tokens_.next()->text.empty() || any;
-      if (any) build_.leave_out("media");
-    } else if (passed != kPassed.end()) {
+      state_.inside = quoted(word.c_str());
+      bool outside = false;
+      while (tokens_.peek() && tokens_.peek()->quoted) outside = !tokens_.next()->text.empty() || outside;
+      if (outside) build_.leave_out("media");
+    } else if (word == "MakeNamedMedium") {
+      const std::string name = quoted(word.c_str());
+      const Parameters p = parameters("medium");
+      medium(name, p);
+    } else if (kPassed.count(word) != 0) {
       const std::string kind = quoted(word.c_str());
       parameters();
-      if (passed->second) build_.leave_out("media");
       if (word == "ColorSpace" && kind != "srgb")
         build_.approximate(fmt::format("the colour space {} is taken as sRGB's", kind));
     } else if (word == "Film") {
@@ -833,10 +835,31 @@ class Reader {
       used = black();
     else
       used = with_alpha(used, p);
+    if (!state_.inside.empty()) used = filled(used);
     if (several.empty()) several.push_back(std::move(g));
     // Normals of meshes follow their transform; those of the others are the product of two tangents that do.
     const bool turned = (kind == "sphere" || kind == "disk" || kind == "cylinder") && place.determinant() < 0;
     for (Geometry& one : several) put(name, std::move(one), place, used, state_.reversed != turned, key, mask);
+  }
+  // Even media that glass holds: what they absorb.
+  void medium(const std::string& name, const Parameters& p) {
+    if (p.word("type", "") != "homogeneous" || p.find("preset") != nullptr) return;
+    const double scale = p.number("scale", 1);
+    const Vec absorbed = colour(p.find("sigma_a"), {0.0011, 0.0024, 0.014}, Use::number) * scale;
+    const Vec scattered = colour(p.find("sigma_s"), {2.55, 3.21, 3.77}, Use::number);
+    media_[name] = {absorbed, std::max({scattered[0], scattered[1], scattered[2]}) > 0};
+    for (const char* ignored : {"type", "g"}) p.ignore(ignored);
+    tell_unread("media", p);
+  }
+  uint32_t filled(uint32_t material) {
+    const auto known = media_.find(state_.inside);
+    const auto glass = known == media_.end() ? std::nullopt : build_.with_absorption(material, known->second.first);
+    if (!glass) {
+      build_.leave_out("media");
+      return material;
+    }
+    if (known->second.second) build_.leave_out("scattering inside of glass");
+    return *glass;
   }
   void put(const std::string& name, Geometry&& g, const Affine& place, uint32_t material, bool flipped,
            const std::string& key, uint32_t mask) {
@@ -992,6 +1015,7 @@ class Reader {
   std::map<std::string, Affine> systems_;
   std::map<std::pair<std::string, bool>, PaintRef> textures_;   // by name, and whether of numbers
   std::map<std::string, std::pair<uint32_t, bool>> materials_;  // and whether it is the border of a medium
+  std::map<std::string, std::pair<Vec, bool>> media_;           // 1/length that they absorb, and whether they scatter
   std::map<std::string, std::vector<Part>> objects_;
   std::optional<std::string> object_;
   std::optional<Geometry> sphere_;
@@ -1005,7 +1029,10 @@ class Reader {
 
 }  // namespace
 
-bool is_pbrt(const std::string& path) { return lower(std::filesystem::path(path).extension().string()) == ".pbrt"; }
+bool is_pbrt(const std::string& path) {
+  const std::string name = lower(path);
+  return name.ends_with(".pbrt") || name.ends_with(".pbrt.gz");
+}
 
 SceneData read_pbrt(const std::string& path) {
   check_regular_file(path);

@@ -240,6 +240,15 @@ class Mitsuba(SceneFiles):
         self.assert_ends(lumicut("render", self.write("loop.xml", scene('<shape type="sphere"><bsdf type="twosided" id="a"><ref id="a"/></bsdf></shape>')),
                                  "-o", self.folder / "x.exr"), BAD_FILE, "without end")
 
+    def test_media_that_glass_holds_absorb(self):
+        ball = ('<shape type="sphere"><bsdf type="{}"/><medium type="homogeneous" name="interior"><rgb name="sigma_t" value=".1, .2, .3"/>'
+                '<float name="albedo" value="0"/><float name="scale" value="2"/></medium></shape>').format
+        done = lumicut("convert", self.write("m.xml", scene(ball("dielectric"))), self.folder / "m.json")
+        self.assert_ends(done, OK)
+        self.assertNotIn("left out", done.stderr)
+        np.testing.assert_allclose(json.loads((self.folder / "m.json").read_text())["materials"][-1]["absorption"], (0.2, 0.4, 0.6), rtol=1e-6)
+        self.assert_ends(lumicut("convert", self.write("m.xml", scene(ball("diffuse"))), self.folder / "m.json"), OK, "media: left out")
+
     def test_scenes_of_before_version_2_are_read_as_they_are_now(self):
         now = scene(camera((0, 3, 5), (0, 0, 0)), '<emitter type="constant"/>',
                     '<shape type="rectangle">' + placed('<rotate x="1" angle="-90"/>') + '<bsdf type="roughplastic"><texture name="diffuse_reflectance" type="checkerboard">'
@@ -263,7 +272,7 @@ class Mitsuba(SceneFiles):
         self.assertEqual(found[0, 0].max(), 0)  # beside the floor
 
     def test_what_is_not_supported_is_named(self):
-        path = self.floor('<emitter type="projector"/>', '<medium type="homogeneous"/>', '<emitter type="point"/>',
+        path = self.floor('<emitter type="projector"/>', '<shape type="cube"><bsdf type="null"/><medium type="homogeneous" name="interior"/></shape>', '<emitter type="point"/>',
                           '<shape type="bsplinecurve"/>', '<shape type="sphere"><bsdf type="hair"/></shape>',
                           '<shape type="sphere"><float name="wide" value="2"/><bsdf type="roughplastic"><boolean name="odd" value="true"/></bsdf></shape>')
         _, said = self.render(path, "--vpls", 10)

@@ -299,6 +299,16 @@ class Pbrt(SceneFiles):
                 if "coated" in more:
                     np.testing.assert_allclose(material["specular"], [0.5] * 3)
 
+    def test_media_that_glass_holds_absorb(self):
+        text = ('Film "rgb"\nWorldBegin MakeNamedMedium "ruby" "string type" "homogeneous" "rgb sigma_a" [ .1 .2 .3 ] "rgb sigma_s" [ {} ] "float scale" 2\n'
+                'MediumInterface "ruby" "" Material "{}" Shape "sphere"').format
+        for words, said in (("0 0 0", ""), ("0 1 0", "scattering inside of glass: left out")):
+            done = lumicut("convert", self.write("m.pbrt", text(words, "dielectric")), self.folder / "m.json")
+            self.assert_ends(done, OK, said)
+            self.assertEqual("left out" in done.stderr, bool(said))
+            np.testing.assert_allclose(json.loads((self.folder / "m.json").read_text())["materials"][-1]["absorption"], (0.2, 0.4, 0.6), rtol=1e-6)
+        self.assert_ends(lumicut("convert", self.write("m.pbrt", text("0 0 0", "diffuse")), self.folder / "m.json"), OK, "media: left out")
+
     def positions(self, shape):
         """Vertices and triangles of a shape, as convert writes them."""
         self.assert_ends(lumicut("convert", self.write("shape.pbrt", f'Film "rgb"\nWorldBegin {shape}'), self.folder / "shape.json"), OK)
@@ -335,6 +345,8 @@ class Pbrt(SceneFiles):
                "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").encode()
         (self.folder / "a.ply.gz").write_bytes(gzip.compress(ply))
         (self.folder / "part.pbrt.gz").write_bytes(gzip.compress(b'Shape "plymesh" "string filename" "a.ply.gz"'))
+        (self.folder / "whole.pbrt.gz").write_bytes(gzip.compress(b'Film "rgb"\nWorldBegin Include "part.pbrt.gz"'))
+        self.assert_ends(lumicut("convert", self.folder / "whole.pbrt.gz", self.folder / "whole.json"), OK)
         vertices, triangles = self.positions('Include "part.pbrt.gz"')
         np.testing.assert_allclose(np.sort(vertices, axis=0), np.sort([[0, 0, 0], [1, 0, 0], [0, 1, 0]], axis=0))
         for broken in (gzip.compress(ply)[:-20], gzip.compress(b"ply\nnonsense"), b"\x1f\x8b\x08nonsense", gzip.compress(bytes(1 << 28))):
@@ -342,7 +354,7 @@ class Pbrt(SceneFiles):
             self.assert_ends(lumicut("render", self.folder / "shape.pbrt", "-o", self.folder / "x.exr"), BAD_FILE, "a.ply.gz")
 
     def test_what_is_not_supported_is_named(self):
-        _, said = self.render(self.floor('LightSource "projection"\nLightSource "point" "float shininess" 3\nMakeNamedMedium "fog" "string type" "homogeneous"\n'
+        _, said = self.render(self.floor('LightSource "projection"\nLightSource "point" "float shininess" 3\nMakeNamedMedium "fog" "string type" "cloud"\nMediumInterface "fog" ""\n'
                                          'Material "measured" "string filename" "a.bsdf"\nMaterial "hair"\nShape "curve"\n'
                                          'Texture "t" "float" "fbm"\nMaterial "coateddiffuse" "float albedo" .5\nShape "sphere" "float wide" 1'), "--vpls", 10)
         for text in ("lights of the kind projection: left out", "media: left out", "kind measured is diffuse", "kind hair is diffuse", "shapes of the kind curve: left out",
