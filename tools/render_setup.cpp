@@ -12,7 +12,7 @@
 #include "io/atomic_file.h"
 #include "io/file_error.h"
 #include "io/scene_file.h"
-#include "plugin/include/lumicut/lumicut_presets.h"
+#include "lumicut/lumicut_presets.h"
 #include "tools/commands.h"
 #include "tools/interrupt_watcher.h"
 

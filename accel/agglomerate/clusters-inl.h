@@ -73,6 +73,15 @@ class Clusters {
       parallel_chunks(n, chunk, std::forward<Fn>(fn));
       return;
     }
+    if constexpr (requires { policy_.schedule(); }) {  // of benchmarks, which count what could run beside each other
+      policy_.schedule().begin_section();
+      for (size_t begin = 0; begin < n; begin += chunk) {
+        fn(begin, std::min(n, begin + chunk));
+        policy_.schedule().end_chunk();
+      }
+      policy_.schedule().end_section();
+      return;
+    }
     for (size_t begin = 0; begin < n; begin += chunk) fn(begin, std::min(n, begin + chunk));
   }
 

@@ -67,7 +67,9 @@ void sort_in_space(const Clusters<Policy>& clusters, std::vector<uint32_t>& acti
   });
   size_t unit = 8;
   while (unit * 8 < items.size()) unit *= 8;
+  if constexpr (requires { clusters.policy().schedule(); }) clusters.policy().schedule().begin_sort();
   split_at_medians(clusters, items.data(), items.size(), unit);
+  if constexpr (requires { clusters.policy().schedule(); }) clusters.policy().schedule().end_sort(items.size());
   for (size_t i = 0; i < active.size(); ++i) active[i] = items[i].cluster;
 }
 

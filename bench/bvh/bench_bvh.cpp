@@ -18,6 +18,7 @@
 #include "bench/bvh/meshes.h"
 #include "bench/bvh/rays.h"
 #include "clustering/light_policy.h"
+#include "clustering/light_tree.h"
 #include "core/rng.h"
 
 using namespace lumicut;
@@ -249,7 +250,9 @@ void bench_build(const std::vector<BenchMesh>& meshes, const std::vector<std::st
   std::printf(" whole (default) | Embree LOW | MEDIUM | HIGH |\n|---|---|");
   for (size_t i = 0; i < builders.size() + 4; ++i) std::printf("---|");
   std::printf("\n");
-  std::map<std::string, std::vector<double>> against_sweep, divisive;
+  std::map<std::string, std::vector<double>> against_sweep, divisive, boxes_against_exact, tris_against_exact;
+  std::map<std::string, std::string> parts;  // Fig. 6, by mesh
+  TreeCost exact_cost;
   std::vector<double> against_binned, against_longest;
   tbb::task_arena one(1);
   for (const BenchMesh& mesh : meshes) {
@@ -263,9 +266,19 @@ void bench_build(const std::vector<BenchMesh>& meshes, const std::vector<std::st
       const bool slow = name.find("+reinsert") != std::string::npos;
       for (int i = 0; i < (slow ? 1 : rounds); ++i)
         seconds.push_back(timed([&] { one.execute([&] { tree = build_tree(boxes, build_options_of(name)); }); }));
-      const double cost = cost_of(tree).cost, us = median(seconds) / static_cast<double>(boxes.size()) * 1e6;
+      const TreeCost all = cost_of(tree);
+      const double cost = all.cost, us = median(seconds) / static_cast<double>(boxes.size()) * 1e6;
       if (name == "sweep") sweep = cost;
-      if (name == "agglomerative") exact = cost, exact_us = us;
+      if (name == "agglomerative") exact = cost, exact_us = us, exact_cost = all;
+      if (name == "agglomerative" || name == "binned-longest") {
+        char text[96];
+        std::snprintf(text, sizeof text, " %.1f | %.2f | %.1f |", all.boxes, all.tris, all.cost);
+        parts[mesh.name] += text;
+      }
+      if (name == "binned-longest" && is_real && exact > 0) {
+        boxes_against_exact[mesh.name].push_back(exact_cost.boxes / all.boxes);
+        tris_against_exact[mesh.name].push_back(exact_cost.tris / all.tris);
+      }
       if (is_real) against_sweep[name].push_back(cost / sweep);
       if (name == "binned-longest" && is_real)
         divisive[mesh.name].push_back(cost / exact), against_longest.push_back(exact_us / us);
@@ -283,6 +296,14 @@ void bench_build(const std::vector<BenchMesh>& meshes, const std::vector<std::st
   for (const auto& [name, values] : against_sweep) std::printf(" %s %.4f;", name.c_str(), geometric_mean(values));
   std::printf("\n\nDivisive (binned-longest) / agglomerative, per real scene (paper: 1.14 to 1.31):");
   for (const auto& [name, values] : divisive) std::printf(" %s %.2f;", name.c_str(), values[0]);
+  std::printf(
+      "\n\nWhat a line is expected to meet [Fig. 6]:\n\n| mesh | agglomerative: boxes | tris | cost | divisive: boxes "
+      "| "
+      "tris | cost |\n|---|---|---|---|---|---|---|\n");
+  for (const auto& [name, text] : parts) std::printf("| %s |%s\n", name.c_str(), text.c_str());
+  std::printf("\nAgglomerative / divisive, boxes and tris (paper: .68 to .83, .94 to .99):");
+  for (const auto& [name, values] : boxes_against_exact)
+    std::printf(" %s %.2f, %.2f;", name.c_str(), values[0], tris_against_exact[name][0]);
   std::printf(
       "\n\nTime of the exact build against our binned builds, geometric means: %.2f of binned (3 axes), %.2f of "
       "binned-longest.\n",
@@ -460,8 +481,10 @@ void bench_scaling(size_t most, uint64_t seed) {
   std::printf(
       "\n## Scaling [Walter et al. 2008, Fig. 9]\n\nSeconds on one thread; lights on the walls of a box, triangles of "
       "a soup. O(N) and O(N²) are drawn through the first row. Exponent: of time between this row and the last.\n\n"
-      "| N | lights, heap | lights, locally ordered | triangles, locally ordered | O(N) | O(N²) | exponent (lights, "
-      "locally ordered) |\n|---|---|---|---|---|---|---|\n");
+      "| N | lights, heap | lights, locally ordered | lights, divisive 6D, whole tree | agglomerative, whole tree | "
+      "triangles, locally ordered | O(N) | O(N²) | exponent (lights, locally ordered) "
+      "|\n|---|---|---|---|---|---|---|---|"
+      "---|\n");
   double first = 0, last = 0, n0 = 0, last_n = 0;
   for (size_t n = 1000; n <= most; n = n * 10 > most && n < most ? most : n * 10) {
     Rng rng(seed, Stage::test);
@@ -481,11 +504,24 @@ void bench_scaling(size_t most, uint64_t seed) {
     const std::vector<Aabb> boxes = boxes_of(soup(n, seed));
     const double heap = timed([&] { agglomerate_lights(lights, 1.7320508f, Strategy::heap); });
     const double local = timed([&] { agglomerate_lights(lights, 1.7320508f, Strategy::locally_ordered); });
+    std::vector<Vpl> vpls(n);
+    for (size_t i = 0; i < n; ++i) {
+      vpls[i].position = lights[i].position, vpls[i].normal = lights[i].normal, vpls[i].kind = lights[i].kind;
+      vpls[i].intensity = Rgb{1, 1, 1} * lights[i].intensity;
+    }
+    const auto whole = [&](LightTree::Method method) {
+      tbb::task_arena one(1);
+      Progress progress;
+      return timed([&] {
+        one.execute([&] { LightTree::build(vpls, {.method = method, .scene_diagonal = 1.7320508f}, progress); });
+      });
+    };
+    const double divisive = whole(LightTree::Method::divisive_6d), tree = whole(LightTree::Method::agglomerative);
     const double triangles = timed([&] { agglomerate_boxes(boxes, Strategy::locally_ordered); });
     const auto dn = static_cast<double>(n);
     if (first == 0) first = local, n0 = dn;
-    std::printf("| %zu | %.4f | %.4f | %.4f | %.4f | %.3g | %s |\n", n, heap, local, triangles, first * dn / n0,
-                first * (dn / n0) * (dn / n0),
+    std::printf("| %zu | %.4f | %.4f | %.4f | %.4f | %.4f | %.4f | %.3g | %s |\n", n, heap, local, divisive, tree,
+                triangles, first * dn / n0, first * (dn / n0) * (dn / n0),
                 last > 0 ? std::to_string(std::log(local / last) / std::log(dn / last_n)).c_str() : "");
     std::fflush(stdout);
     last = local, last_n = dn;
