@@ -406,7 +406,7 @@ std::vector<uint32_t> BallTree::contained(std::span<const double> c, double radi
       [radius](double d, double r) { return d + r <= radius; });
 }
 
-std::vector<uint32_t> BallTree::nearest(std::span<const double> p, size_t m) const {
+std::vector<uint32_t> BallTree::nearest(std::span<const double> p, size_t m, Distance by) const {
   check(p, 0, "the query");
   std::vector<std::pair<double, uint32_t>> heap;  // the m best so far, worst on top
   struct Entry {
@@ -421,7 +421,11 @@ std::vector<uint32_t> BallTree::nearest(std::span<const double> p, size_t m) con
     stack.pop_back();
     const Node& n = nodes_[e.node];
     if (n.leaf != kNone) {
-      const std::pair<double, uint32_t> candidate{distance(centre(e.node), p.data()), n.leaf};
+      const double d = distance(centre(e.node), p.data());
+      const std::pair<double, uint32_t> candidate{by == Distance::centre  ? d
+                                                  : by == Distance::least ? std::max(0.0, d - n.radius)
+                                                                          : d + n.radius,
+                                                  n.leaf};
       if (heap.size() == m && !(candidate < heap.front())) continue;
       heap.push_back(candidate);
       std::push_heap(heap.begin(), heap.end());

@@ -60,8 +60,10 @@ class BallTree {
   std::vector<uint32_t> containing(std::span<const double> centre, double radius) const;    // that hold the ball wholly
   std::vector<uint32_t> intersecting(std::span<const double> centre, double radius) const;  // that touch it
   std::vector<uint32_t> contained(std::span<const double> centre, double radius) const;     // wholly inside it
-  // The m leaves whose centres are nearest to the point, nearest first, the smaller id on ties.
-  std::vector<uint32_t> nearest(std::span<const double> point, size_t m) const;
+  // The m leaves that are nearest to the point, nearest first, the smaller id on ties: by their centres, by their nearest
+  // points (0 inside), or by their furthest.
+  enum class Distance { centre, least, greatest };
+  std::vector<uint32_t> nearest(std::span<const double> point, size_t m, Distance by = Distance::centre) const;
   // The leaf (other than `except`) whose joint ball with the given one is smallest; kNone when there is none.
   uint32_t best_mate(std::span<const double> centre, double radius, uint32_t except = kNone) const;
 

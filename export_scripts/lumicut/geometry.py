@@ -14,6 +14,7 @@ import numpy as np
 NONE = 0xFFFFFFFF
 STRATEGIES = ("naive", "heap", "local", "parallel")
 BUILDERS = ("kd", "top-down", "insertion", "cheap-insertion", "bottom-up")
+DISTANCES = ("centre", "least", "greatest")
 METRICS = ("sander", "schlafman")
 SEARCHES = ("containing", "intersecting", "contained")
 _SIZES, _DOUBLES, _INDICES = POINTER(c_size_t), POINTER(c_double), POINTER(c_uint32)
@@ -60,6 +61,8 @@ FUNCTIONS = {
     "balltree_measure": (c_int, [c_void_p, _SIZES, _DOUBLES, _SIZES]),
     "balltree_search": (c_int, [c_void_p, c_int, _DOUBLES, _DOUBLES, c_size_t, _SIZES, POINTER(c_void_p)]),
     "balltree_nearest": (c_int, [c_void_p, _DOUBLES, c_size_t, c_size_t, _INDICES]),
+    "balltree_nearest_by": (c_int, [c_void_p, c_int, _DOUBLES, c_size_t, c_size_t, _INDICES]),
+    "balltree_best_mate": (c_int, [c_void_p, _DOUBLES, _DOUBLES, c_size_t, _INDICES]),
     "hull_create": (c_int, [c_int, POINTER(c_void_p)]),
     "hull_release": (None, [c_void_p]),
     "hull_push": (c_int, [c_void_p, _DOUBLES, c_size_t]),
@@ -306,11 +309,18 @@ class BallTree(_Object):
                                                    len(centres), offsets.ctypes.data_as(_SIZES), byref(found)))
         return np.split(_taken(found), offsets[1:-1].astype(np.intp)) if len(centres) else []
 
-    def nearest(self, points, count=1):
-        """The leaves with the nearest centres (n, count), nearest first; NONE fills up."""
+    def best_mate(self, centres, radii=None):
+        """For each ball (None: point) the leaf whose joint ball with it is least."""
+        centres = _rows(centres, self.dimension, "centres")
+        radii, leaves = _numbers(radii, len(centres), "radii"), np.empty(len(centres), np.uint32)
+        _check(_geometry().lumicut_balltree_best_mate(self._handle, _pointer(centres), _pointer(radii), len(centres), _pointer(leaves, c_uint32)))
+        return leaves
+
+    def nearest(self, points, count=1, by="centre"):
+        """The nearest leaves (n, count), nearest first; NONE fills up. by: distance to their centre, their least or their greatest."""
         points = _rows(points, self.dimension, "points")
         leaves = np.empty((len(points), count), np.uint32)
-        _check(_geometry().lumicut_balltree_nearest(self._handle, _pointer(points), len(points), count, _pointer(leaves, c_uint32)))
+        _check(_geometry().lumicut_balltree_nearest_by(self._handle, _choice(by, DISTANCES, "by"), _pointer(points), len(points), count, _pointer(leaves, c_uint32)))
         return leaves
 
 

@@ -215,14 +215,32 @@ int lumicut_balltree_search(lumicut_balltree tree, int kind, const double* centr
 
 int lumicut_balltree_nearest(lumicut_balltree tree, const double* points, size_t count, size_t nearest,
                              uint32_t* leaves) {
+  return lumicut_balltree_nearest_by(tree, 0, points, count, nearest, leaves);
+}
+
+int lumicut_balltree_best_mate(lumicut_balltree tree, const double* centres, const double* radii, size_t count,
+                               uint32_t* leaves) {
   return guard([&] {
+    const BallTree& t = required(tree, "tree").tree;
+    const auto width = static_cast<size_t>(t.dimension());
+    const auto c = array(centres, count, width, "centres");
+    if (count != 0) required(leaves, "leaves");
+    for (size_t q = 0; q < count; ++q)
+      leaves[q] = t.best_mate(c.subspan(q * width, width), radii == nullptr ? 0.0 : radii[q]);
+  });
+}
+
+int lumicut_balltree_nearest_by(lumicut_balltree tree, int by, const double* points, size_t count, size_t nearest,
+                                uint32_t* leaves) {
+  return guard([&] {
+    if (by < 0 || by > 2) fail_argument("by " + std::to_string(by) + " is not in 0 to 2");
     const BallTree& t = required(tree, "tree").tree;
     const auto width = static_cast<size_t>(t.dimension());
     const auto p = array(points, count, width, "points");
     if (count != 0 && nearest != 0) required(leaves, "leaves");
     std::vector<uint32_t> all;
     for (size_t q = 0; q < count; ++q) {
-      const auto one = t.nearest(p.subspan(q * width, width), nearest);
+      const auto one = t.nearest(p.subspan(q * width, width), nearest, static_cast<BallTree::Distance>(by));
       all.insert(all.end(), one.begin(), one.end());
       all.resize((q + 1) * nearest, LUMICUT_GEOMETRY_NONE);
     }

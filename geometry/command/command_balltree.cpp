@@ -14,7 +14,7 @@ namespace lumicut {
 namespace {
 
 struct Arguments {
-  std::string balls, builder = "bottom-up", picture, queries, kind = "nearest", out = "-";
+  std::string balls, builder = "bottom-up", picture, queries, kind = "nearest", by = "centre", out = "-";
   bool radii = false;
   int size = 1000;
   size_t count = 1;
@@ -53,10 +53,14 @@ std::string answers(const Arguments& a, const BallTree& tree, const Balls& queri
   for (size_t i = 0; i < queries.size(); ++i) {
     const auto centre = std::span(queries.centres).subspan(i * queries.dimension, queries.dimension);
     const double radius = queries.radii.empty() ? 0.0 : queries.radii[i];
-    const std::vector<uint32_t> found = a.kind == "containing"     ? tree.containing(centre, radius)
+    const auto by = a.by == "least"      ? BallTree::Distance::least
+                    : a.by == "greatest" ? BallTree::Distance::greatest
+                                         : BallTree::Distance::centre;
+    const std::vector<uint32_t> found = a.kind == "best-mate"      ? std::vector{tree.best_mate(centre, radius)}
+                                        : a.kind == "containing"   ? tree.containing(centre, radius)
                                         : a.kind == "intersecting" ? tree.intersecting(centre, radius)
                                         : a.kind == "contained"    ? tree.contained(centre, radius)
-                                                                   : tree.nearest(centre, a.count);
+                                                                   : tree.nearest(centre, a.count, by);
     for (size_t k = 0; k < found.size(); ++k) text += (k == 0 ? "" : ",") + std::to_string(found[k]);
     text += '\n';
   }
@@ -89,8 +93,9 @@ int run(const Arguments& a) {
                   " dimensions, and pictures two");
   Balls queries;
   if (!a.queries.empty()) {
-    queries = read_balls(a.queries, a.kind != "nearest" && a.kind != "containing");
-    if (queries.dimension == balls.dimension + 1 && a.kind == "containing") queries = read_balls(a.queries, true);
+    queries = read_balls(a.queries, a.kind != "nearest" && a.kind != "containing" && a.kind != "best-mate");
+    if (queries.dimension == balls.dimension + 1 && (a.kind == "containing" || a.kind == "best-mate"))
+      queries = read_balls(a.queries, true);
     if (queries.dimension != balls.dimension)
       fail_argument(a.queries + ": " + std::to_string(queries.dimension) + " dimensions, and " + a.balls + " has " +
                     std::to_string(balls.dimension));
@@ -132,9 +137,13 @@ Command add_balltree(CLI::App& app) {
   command
       ->add_option(
           "--kind", a->kind,
-          "Of queries. nearest: --count leaves by their centres; containing: leaves that hold the point or ball; "
-          "intersecting, contained: leaves that touch the ball or lie in it")
-      ->check(CLI::IsMember({"nearest", "containing", "intersecting", "contained"}));
+          "Of queries. nearest: --count leaves; containing: leaves that hold the point or ball; "
+          "intersecting, contained: leaves that touch the ball or lie in it; best-mate: the leaf whose joint ball with "
+          "the point or ball is least")
+      ->check(CLI::IsMember({"nearest", "containing", "intersecting", "contained", "best-mate"}));
+  command
+      ->add_option("--by", a->by, "Of nearest leaves: distance to their centres, to their nearest points or furthest")
+      ->check(CLI::IsMember({"centre", "least", "greatest"}));
   command->add_option("--count", a->count, "Of nearest leaves")->check(CLI::Range(1, 1000000));
   command->add_option("--out", a->out, "CSV of the answers (-: standard output)");
   add_picture(*command, a->picture, a->size, "Picture of a tree in the plane, .svg or .png");

@@ -117,6 +117,19 @@ class BallTrees(unittest.TestCase):
                 self.assertEqual([list(f) for f in found], [list(np.flatnonzero(row)) for row in hits], (builder, kind))
             np.testing.assert_array_equal(tree.nearest(self.queries, 5), np.argsort(self.apart, 1, kind="stable")[:, :5])
 
+    def test_nearest_by_nearest_and_furthest_points_and_best_mates(self):
+        reach = {"centre": self.apart, "least": np.maximum(0, self.apart - self.radii), "greatest": self.apart + self.radii}
+        q, r = self.reaches[:, None], self.radii
+        joint = np.maximum(np.maximum(q, r), (self.apart + q + r) / 2)
+        for builder in g.BUILDERS:
+            tree = g.BallTree(self.centres, self.radii, builder)
+            for by, distances in reach.items():
+                np.testing.assert_array_equal(tree.nearest(self.queries, 6, by), np.argsort(distances, 1, kind="stable")[:, :6], f"{builder} {by}")
+            mates = tree.best_mate(self.queries, self.reaches)
+            np.testing.assert_allclose(joint[np.arange(40), mates], joint.min(1), rtol=1e-12)
+        with self.assertRaisesRegex(g.Error, "by"):
+            tree.nearest(self.queries, 1, "mean")
+
     def test_leaves_come_and_go(self):
         tree = g.BallTree(self.centres[:3], builder="insertion")
         leaf = tree.insert([9, 9, 9])

@@ -116,6 +116,21 @@ class GeometryCommand(unittest.TestCase):
                 self.assertEqual(done.returncode, 0, done.stderr)
                 self.assertEqual([[int(v) for v in line.split(",") if v] for line in done.stdout.split("\n")[:-1]], expected, (builder, kind))
 
+    def test_nearest_by_furthest_points_and_the_best_mate(self):
+        balls = [[self.random.uniform(-1, 1) for _ in range(2)] + [self.random.uniform(0, 0.4)] for _ in range(50)]
+        queries = [[self.random.uniform(-1, 1) for _ in range(2)] + [self.random.uniform(0, 0.5)] for _ in range(10)]
+        file, with_radius = (self.write(name, [",".join(map(repr, b)) for b in rows_]) for name, rows_ in (("b.csv", balls), ("q.csv", queries)))
+        points = self.write("p.csv", [",".join(map(repr, q[:2])) for q in queries])
+        done = run("balltree", file, "--radii", "--queries", points, "--count", 3, "--by", "greatest")
+        self.assertEqual([[int(v) for v in line.split(",")] for line in done.stdout.split()],
+                         [sorted(range(50), key=lambda i, q=q: math.dist(balls[i][:2], q[:2]) + balls[i][2])[:3] for q in queries], done.stderr)
+        done = run("balltree", file, "--radii", "--queries", with_radius, "--kind", "best-mate")
+
+        def joint(b, q):
+            return max(b[2], q[2], (math.dist(b[:2], q[:2]) + b[2] + q[2]) / 2)
+        for line, q in zip(done.stdout.split(), queries, strict=True):
+            self.assertAlmostEqual(joint(balls[int(line)], q), min(joint(b, q) for b in balls))
+
     def test_all_builders_are_compared_and_a_tree_is_drawn(self):
         file = self.write("points.csv", [f"{self.random.random()},{self.random.random()}" for _ in range(100)])
         done = run("balltree", file, "--builder", "all")

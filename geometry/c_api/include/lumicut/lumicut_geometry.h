@@ -108,6 +108,14 @@ LUMICUT_GEOMETRY_API int lumicut_balltree_search(lumicut_balltree tree, int kind
 LUMICUT_GEOMETRY_API int lumicut_balltree_nearest(lumicut_balltree tree, const double* points, size_t count,
                                                   size_t nearest, uint32_t* leaves);
 
+/* The same by the distance to centres (0), to the nearest points of leaves (1; 0 inside) or to their furthest (2). */
+LUMICUT_GEOMETRY_API int lumicut_balltree_nearest_by(lumicut_balltree tree, int by, const double* points, size_t count,
+                                                     size_t nearest, uint32_t* leaves);
+/* The leaf whose joint ball with each of `count` balls is least; LUMICUT_GEOMETRY_NONE of an empty tree. `radii`: NULL for
+   points. */
+LUMICUT_GEOMETRY_API int lumicut_balltree_best_mate(lumicut_balltree tree, const double* centres, const double* radii,
+                                                    size_t count, uint32_t* leaves);
+
 /* ---- Convex hull of a window that slides along a simple chain [Bus and Buzer 2015] ---- */
 typedef struct lumicut_hull_t* lumicut_hull;
 LUMICUT_GEOMETRY_API int lumicut_hull_create(int check_simple,
