@@ -9,11 +9,12 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <functional>
+#include <limits>
 #include <numbers>
 
 #include "io/affine.h"
 #include "io/file_error.h"
+#include "io/gltf_document.h"
 #include "io/scene_defaults.h"
 #include "io/texture_store.h"
 #include "io/unpack_folder.h"
@@ -28,7 +29,6 @@ namespace fs = std::filesystem;
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kLumensPerWatt = 683;  // as other exporters take it: candela, lux and nits over this
-constexpr size_t kMostNodes = 1 << 24;  // placed, each time a node is reached by one of its parents
 constexpr int kDeepest = 256;
 
 Affine placed(const Vec& move, const std::array<double, 4>& q, const Vec& scale) {
@@ -56,10 +56,18 @@ class Reader {
           return true;
         },
         nullptr);
+    std::string folder = fs::path(path_).parent_path().string();
+    if (folder.empty()) folder = ".";
+    loader.SetFsCallbacks(
+        {exists_beside, [](const std::string& name, void*) { return name; }, read_beside, nullptr, &folder});
     std::string error, warning;
-    const bool binary = path_.size() > 3 && std::string(path_.end() - 3, path_.end()) != "ltf";
-    const bool done = binary ? loader.LoadBinaryFromFile(&model_, &error, &warning, path_)
-                             : loader.LoadASCIIFromFile(&model_, &error, &warning, path_);
+    const std::string file = read_whole_file(path_, std::numeric_limits<uint32_t>::max());
+    check_gltf_document(path_, file);
+    const auto* bytes = reinterpret_cast<const unsigned char*>(file.data());
+    const auto size = static_cast<unsigned>(file.size());
+    const bool done = is_binary_gltf(file)
+                          ? loader.LoadBinaryFromMemory(&model_, &error, &warning, bytes, size, folder)
+                          : loader.LoadASCIIFromString(&model_, &error, &warning, file.data(), size, folder);
     if (!done) throw FileError(path_, error.empty() ? "is no glTF 2.0 file" : one_line(error));
     if (!warning.empty()) scene_.warnings.add("warnings of the glTF reader", path_, one_line(warning));
     note_extensions();
@@ -78,6 +86,18 @@ class Reader {
   }
 
  private:
+  // tinygltf looks in the working folder too, where the file would be another one.
+  static bool exists_beside(const std::string& name, void* folder) {
+    std::error_code code;
+    const std::string& start = *static_cast<const std::string*>(folder);
+    return (name.starts_with(start) || name.starts_with('/')) && fs::exists(name, code);
+  }
+  static bool read_beside(std::vector<unsigned char>* out, std::string*, const std::string& name, void*) {
+    check_regular_file(name);
+    const std::string bytes = read_whole_file(name);
+    out->assign(bytes.begin(), bytes.end());
+    return true;
+  }
   [[noreturn]] void fail(const std::string& where, const std::string& text) const {
     throw FileError(path_, fmt::format("{}: {}", where, text));
   }
@@ -450,14 +470,18 @@ class Reader {
     if (!model_.scenes.empty()) {
       roots = at(model_.scenes, std::max(0, model_.defaultScene), "scene").nodes;
     } else {
-      for (size_t n = 0; n < model_.nodes.size(); ++n) roots.push_back(static_cast<int>(n));
+      std::vector<bool> child(model_.nodes.size());
+      for (const gltf::Node& node : model_.nodes)
+        for (const int n : node.children) child[static_cast<size_t>(n)] = true;
+      for (size_t n = 0; n < model_.nodes.size(); ++n)
+        if (!child[n]) roots.push_back(static_cast<int>(n));
     }
     for (const int root : roots) read_node(root, {}, 0);
     std::erase_if(scene_.meshes, [](const Mesh& mesh) { return mesh.indices.empty() || mesh.transforms.empty(); });
   }
   void read_node(int index, const Affine& parent, int depth) {
     const std::string where = fmt::format("nodes[{}]", index);
-    if (depth > kDeepest || ++placed_nodes_ > kMostNodes) fail(where, "nodes lie in each other without end");
+    if (depth > kDeepest) fail(where, fmt::format("lies in more than {} others", kDeepest));
     const gltf::Node& node = at(model_.nodes, index, where);
     Affine local;
     if (node.matrix.size() == 16) {
@@ -494,6 +518,9 @@ class Reader {
       const size_t count = std::max({t.size() / 3, q.size() / 4, s.size() / 3});
       for (const size_t n : {t.size() / 3, q.size() / 4, s.size() / 3})
         if (n != 0 && n != count) fail(where, "its instances have different numbers of attributes");
+      for (size_t i = 0; i + 3 < q.size(); i += 4)
+        if (q[i] == 0 && q[i + 1] == 0 && q[i + 2] == 0 && q[i + 3] == 0)
+          fail(where, fmt::format("ROTATION of its instance {} is none: its length is 0", i / 4));
       places.clear();
       for (size_t i = 0; i < count; ++i)
         places.push_back(world * placed(t.empty() ? Vec{0, 0, 0} : Vec{t[3 * i], t[3 * i + 1], t[3 * i + 2]},
@@ -569,7 +596,6 @@ class Reader {
   std::map<std::pair<int, size_t>, int32_t> channels_;
   std::vector<size_t> first_;  // of a mesh's primitives in scene_.meshes; one more at the end
   bool has_camera_ = false;
-  size_t placed_nodes_ = 0;
 };
 
 }  // namespace

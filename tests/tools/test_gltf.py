@@ -2,7 +2,9 @@
 import base64
 import json
 import math
+import os
 import struct
+import time
 import unittest
 import zlib
 
@@ -216,9 +218,8 @@ class Gltf(cli.Cli):
         wrong(lambda d: d.json["accessors"][1].update(count=4000), "accessors[1]", "4000", "buffers[0]")
         wrong(lambda d: d.json["accessors"][d.json["meshes"][0]["primitives"][0]["indices"]].update(componentType=5126, count=1),
               "accessors[", "componentType 5126", "indices")
-        wrong(lambda d: d.json["nodes"][0].update(extensions={"KHR_lights_punctual": {"light": 1e300}}), "2147483647")
-        wrong(lambda d: d.json["nodes"].__setitem__(0, {"mesh": 7}), "nodes[0]", "7")
-        wrong(lambda d: d.json["nodes"][0].update(children=[0]), "nodes[0]", "without end")
+        wrong(lambda d: d.json["nodes"][0].update(extensions={"KHR_lights_punctual": {"light": 1e300}}), "nodes[0].extensions.KHR_lights_punctual.light", "1e+300")
+        wrong(lambda d: d.json["nodes"][0].update(children=[0]), "scenes[0].nodes[0]", "nodes[0] is a child of nodes[0]")
         wrong(lambda d: d.json["materials"][0].update(pbrMetallicRoughness={"roughnessFactor": 3}), "materials[0].roughnessFactor", "3")
         wrong(lambda d: d.json.update(extensionsRequired=["KHR_draco_mesh_compression"], extensionsUsed=["KHR_draco_mesh_compression"]),
               "KHR_draco_mesh_compression")
@@ -227,6 +228,69 @@ class Gltf(cli.Cli):
             (self.folder / name).write_bytes(content)
             self.assert_ends(lumicut("render", self.folder / name, "-o", self.folder / "x.exr"), BAD_FILE, name)
         self.assert_ends(lumicut("render", self.folder / "no.glb", "-o", self.folder / "x.exr"), BAD_FILE, "no.glb")
+
+    def refused(self, change, *texts, name="bad.gltf"):
+        d = Document()
+        d.node(mesh=d.square({}))
+        change(d)
+        started = time.monotonic()
+        self.assert_ends(lumicut("convert", d.write(self.folder / name), self.folder / "x.json"), BAD_FILE, name, *texts)
+        self.assertLess(time.monotonic() - started, 30, texts)  # none is waited for or grows without end
+
+    def test_deeply_nested_json_is_refused_in_either_form_of_file(self):
+        deep = []
+        for _ in range(500):
+            deep = [deep]
+        for name in ("bad.gltf", "bad.glb"):
+            self.refused(lambda d: d.json.update(extras=deep), "deeper than 64 levels", name=name)
+        nested = b'{"asset":{"version":"2.0"},"extras":' + b"[" * 50000 + b"]" * 50000 + b"}"
+        nested += b" " * (-len(nested) % 4)
+        (self.folder / "a.gltf").write_bytes(nested)
+        (self.folder / "a.glb").write_bytes(struct.pack("<4sIIII", b"glTF", 2, 20 + len(nested), len(nested), 0x4E4F534A) + nested)
+        for name in ("a.gltf", "a.glb"):
+            self.assert_ends(lumicut("convert", self.folder / name, self.folder / "x.json"), BAD_FILE, name, "deeper than 64 levels")
+
+    def test_pipes_devices_and_folders_are_refused_as_buffers_and_images(self):
+        os.mkfifo(self.folder / "pipe")
+        for uri, text in (("pipe", "pipe"), (".", "folder"), ("../" * 12 + "dev/zero", "device")):
+            for kind in ("buffers", "images"):
+                d = Document()
+                d.node(mesh=d.square({}))
+                path = d.write(self.folder / "bad.gltf")
+                written = json.loads(path.read_text())
+                written.setdefault(kind, [{}])[0]["uri"] = uri
+                path.write_text(json.dumps(written))
+                self.assert_ends(lumicut("convert", path, self.folder / "x.json"), BAD_FILE, "bad.gltf", f"{kind}[0].uri", f"is a {text}")
+
+    def test_a_node_has_one_parent(self):
+        self.refused(lambda d: d.json["nodes"].extend([{"children": [2, 2]}, {}]), "nodes[1].children[1]", "nodes[2] is a child of nodes[1] already")
+        self.refused(lambda d: d.json["nodes"].extend([{"children": [3]}, {"children": [3]}, {}]), "nodes[2].children[0]", "of nodes[1]")
+        self.refused(lambda d: d.json["scenes"][0]["nodes"].append(0), "scenes[0].nodes[1]", "twice")
+
+    def test_without_a_scene_children_stand_in_their_parents_alone(self):
+        d = Document()
+        mesh = d.square({"emissiveFactor": [1, 1, 1]})
+        d.json["nodes"] = [{"children": [1], "translation": [5, 0, 0]}, {"mesh": mesh}]
+        del d.json["scene"], d.json["scenes"]
+        self.assert_ends(lumicut("convert", d.write(self.folder / "a.gltf"), self.folder / "a.json"), OK)
+        meshes = json.loads((self.folder / "a.json").read_text())["meshes"]
+        self.assertEqual(sum(len(m.get("instances", [0])) for m in meshes), 1)
+
+    def test_values_of_a_wrong_kind_are_refused_by_name(self):
+        for number in (7, -1, 2**31, 2**63, 1.5, "a"):
+            self.refused(lambda d: d.json["nodes"][0].update(mesh=number), "nodes[0].mesh", str(number), "meshes")
+        self.refused(lambda d: d.json["nodes"][0].update(matrix=[1, 1, 1]), "nodes[0].matrix", "16")
+        self.refused(lambda d: d.json["nodes"][0].update(rotation=[0, 0, 0, 0]), "nodes[0].rotation", "length is 0")
+        self.refused(lambda d: d.json["meshes"][0]["primitives"][0].update(material=-2), "meshes[0].primitives[0].material", "-2")
+        for color in ([-1, 0, 0], [1, "x", 0], [1, 1], "red"):
+            self.refused(lambda d: d.light("point", 1) or d.json["extensions"]["KHR_lights_punctual"]["lights"][0].update(color=color),
+                         "extensions.KHR_lights_punctual.lights[0].color")
+        for extension, key in (("KHR_materials_ior", "ior"), ("KHR_materials_transmission", "transmissionFactor"),
+                               ("KHR_materials_volume", "attenuationColor")):
+            self.refused(lambda d: d.json["materials"][0].update(extensions={extension: {key: "x"}}), f"materials[0].extensions.{extension}.{key}")
+        self.refused(lambda d: d.json["materials"][0].update(extensions={"KHR_materials_ior": []}), "materials[0].extensions.KHR_materials_ior")
+        self.refused(lambda d: d.json["materials"][0].update(pbrMetallicRoughness={"metallicFactor": "x"}),
+                     "materials[0].pbrMetallicRoughness.metallicFactor")
 
 
 if __name__ == "__main__":
