@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "io/image_file.h"
@@ -16,7 +17,8 @@ namespace lumicut::io {
 class ImageModule {
  public:
   virtual Image read_image(const std::string& path) const = 0;
-  virtual Texture read_texture(const std::string& path, TextureUse use, uint32_t flags,
+  // `held` are the bytes of an image that lies in another file; `path` is then what errors call it. Empty: the file `path`.
+  virtual Texture read_texture(const std::string& path, std::string_view held, TextureUse use, uint32_t flags,
                                const std::string& user) const = 0;
   virtual std::string encode_png(const std::string& name, const std::vector<uint8_t>& pixels, int width, int height,
                                  int components) const = 0;
@@ -31,7 +33,8 @@ const ImageModule& image_module(const std::string& file);
 // Inside the module.
 namespace oiio {
 Image read_image(const std::string& path);
-Texture read_texture(const std::string& path, TextureUse use, uint32_t flags, const std::string& user);
+Texture read_texture(const std::string& path, std::string_view held, TextureUse use, uint32_t flags,
+                     const std::string& user);
 std::string encode_png(const std::string& name, const std::vector<uint8_t>& pixels, int width, int height,
                        int components);
 }  // namespace oiio

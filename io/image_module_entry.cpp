@@ -8,9 +8,9 @@ namespace {
 class Module final : public ImageModule {
  public:
   Image read_image(const std::string& path) const override { return oiio::read_image(path); }
-  Texture read_texture(const std::string& path, TextureUse use, uint32_t flags,
+  Texture read_texture(const std::string& path, std::string_view held, TextureUse use, uint32_t flags,
                        const std::string& user) const override {
-    return oiio::read_texture(path, use, flags, user);
+    return oiio::read_texture(path, held, use, flags, user);
   }
   std::string encode_png(const std::string& name, const std::vector<uint8_t>& pixels, int width, int height,
                          int components) const override {

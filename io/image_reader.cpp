@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "io/file_error.h"
 #include "io/image_module.h"
@@ -92,7 +93,7 @@ Image read_image(const std::string& path) {
     const OIIO::ImageSpec spec = in->spec();
     if (spec.deep || spec.depth > 1)
       throw FileError(path, "holds deep or three-dimensional pixels, which are not read");
-    check_image_size(path, *in);
+    check_image_size(path, *in, std::filesystem::file_size(path));
     if (part == 0) {
       image.width = spec.width, image.height = spec.height, image.x0 = spec.x, image.y0 = spec.y;
       image.frame_width = spec.full_width, image.frame_height = spec.full_height;

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <fstream>
+#include <sstream>
 
 #include "io/file_error.h"
 #include "io/physical_memory.h"
@@ -28,12 +28,14 @@ bool knows_limit(const std::string& format, const std::string& method) {
 // OpenEXR takes the memory that an attribute's size asks for, up to 2 GB, before it looks for the bytes. Headers are lists
 // of name, type, size, value that an empty name ends; several parts are ended by an empty header.
 // [https://openexr.com/en/latest/OpenEXRFileLayout.html]
-void check_exr_attributes(const std::string& path, const std::string& as) {
-  std::ifstream file(path, std::ios::binary);
+void check_exr_attributes(const std::string& path, const std::string& as, std::istream& file) {
   uint32_t start[2] = {};
   constexpr uint32_t kMagic = 20000630, kMultiPart = 0x1000;
   if (!file.read(reinterpret_cast<char*>(start), sizeof(start)) || start[0] != kMagic) return;
-  const auto length = static_cast<int64_t>(std::filesystem::file_size(path));
+  const auto after = file.tellg();
+  file.seekg(0, std::ios::end);
+  const auto length = static_cast<int64_t>(file.tellg());
+  file.seekg(after);
   std::string name, type;
   bool empty = true;  // the header, so far
   for (;;) {
@@ -59,13 +61,26 @@ void check_exr_attributes(const std::string& path, const std::string& as) {
 std::unique_ptr<OIIO::ImageInput> open_image(const std::string& path, const std::string& as,
                                              const OIIO::ImageSpec* wish) {
   check_regular_file(path);
-  check_exr_attributes(path, as);
+  std::ifstream file(path, std::ios::binary);
+  check_exr_attributes(path, as, file);
   auto input = OIIO::ImageInput::open(path, wish);
   if (!input) throw FileError(path, fmt::format("not readable as {}: {}", as, OIIO::geterror()));
   return input;
 }
 
-void check_image_size(const std::string& path, const OIIO::ImageInput& input) {
+std::unique_ptr<OIIO::ImageInput> open_held_image(const std::string& path, const std::string& as, std::string_view held,
+                                                  OIIO::Filesystem::IOMemReader& memory) {
+  if (held.starts_with("\x76\x2f\x31\x01")) {
+    std::istringstream file{std::string(held)};
+    check_exr_attributes(path, as, file);
+  }
+  // The ending says which format is tried first.
+  auto input = OIIO::ImageInput::open(held.starts_with("\xff\xd8") ? "image.jpg" : "image.png", nullptr, &memory);
+  if (!input) throw FileError(path, fmt::format("not readable as {}: {}", as, OIIO::geterror()));
+  return input;
+}
+
+void check_image_size(const std::string& path, const OIIO::ImageInput& input, uint64_t size) {
   const OIIO::ImageSpec& spec = input.spec();
   const double pixels = static_cast<double>(spec.width) * spec.height;
   if (!(pixels >= 1) || pixels > static_cast<double>(kMaxImagePixels))
@@ -77,9 +92,8 @@ void check_image_size(const std::string& path, const OIIO::ImageInput& input) {
         path, fmt::format("takes {:.1f} GB as {} x {} pixels of {} channels, more than half of this machine's memory",
                           bytes / 1e9, spec.width, spec.height, spec.nchannels));
   if (!knows_limit(input.format_name(), spec.get_string_attribute("compression"))) return;
-  const double size = static_cast<double>(std::filesystem::file_size(path));
-  if (pixels * static_cast<double>(spec.pixel_bytes(true)) > size * kBestRatio)
-    throw FileError(path, fmt::format("promises {} x {} pixels of {} channels, more than its {:.0f} bytes can hold",
+  if (pixels * static_cast<double>(spec.pixel_bytes(true)) > static_cast<double>(size) * kBestRatio)
+    throw FileError(path, fmt::format("promises {} x {} pixels of {} channels, more than its {} bytes can hold",
                                       spec.width, spec.height, spec.nchannels, size));
 }
 

@@ -1,11 +1,13 @@
 // What an image's header says of its size, held against the file before memory is taken.
 #pragma once
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 
 namespace lumicut::io {
 
@@ -16,8 +18,13 @@ inline constexpr uint64_t kMaxImagePixels = uint64_t{1} << 28;
 std::unique_ptr<OIIO::ImageInput> open_image(const std::string& path, const std::string& as,
                                              const OIIO::ImageSpec* wish = nullptr);
 
-// Throws FileError when the opened image has more than kMaxImagePixels, or more samples than a file of this length can hold
+// The same for one whose bytes another file holds; `path` is what errors call it. `memory` reads the bytes as long as what is
+// returned.
+std::unique_ptr<OIIO::ImageInput> open_held_image(const std::string& path, const std::string& as, std::string_view held,
+                                                  OIIO::Filesystem::IOMemReader& memory);
+
+// Throws FileError when the opened image has more than kMaxImagePixels, or more samples than a file of `size` bytes can hold
 // after the best compression that its format knows: a broken header. Multi-part files: what is current.
-void check_image_size(const std::string& path, const OIIO::ImageInput& input);
+void check_image_size(const std::string& path, const OIIO::ImageInput& input, uint64_t size);
 
 }  // namespace lumicut::io

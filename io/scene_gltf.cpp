@@ -8,7 +8,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <numbers>
 
@@ -17,7 +16,6 @@
 #include "io/gltf_document.h"
 #include "io/scene_defaults.h"
 #include "io/texture_store.h"
-#include "io/unpack_folder.h"
 #include "io/vertex_colours.h"
 
 namespace lumicut::io {
@@ -223,23 +221,15 @@ class Reader {
     if (s.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST) flags |= LUMICUT_NEAREST;
     return flags;
   }
-  std::string image_file(int texture, const std::string& user) {
-    const int source = at(model_.textures, texture, user).source;
-    const auto& image = at(model_.images, source, user);
-    if (image.image.empty()) fail(user, fmt::format("images[{}] ({}) is not there", source, image.uri));
-    const bool jpeg = image.image.size() > 1 && image.image[0] == 0xff && image.image[1] == 0xd8;
-    const fs::path file = folder_.path() / fmt::format("image{}.{}", source, jpeg ? "jpg" : "png");
-    if (!fs::exists(file)) {
-      std::ofstream out(file, std::ios::binary);
-      out.write(reinterpret_cast<const char*>(image.image.data()), static_cast<std::streamsize>(image.image.size()));
-      if (!out.flush()) throw FileError(file.string(), "cannot be written");
-    }
-    return file.string();
-  }
   int32_t texture(int index, TextureUse use, const std::string& user) {
     if (index < 0) return 0;
     const uint32_t flags = flags_of(at(model_.textures, index, user).sampler);
-    return textures_.get(image_file(index, user), use, flags, user);
+    const int source = at(model_.textures, index, user).source;
+    const auto& image = at(model_.images, source, user);
+    if (image.image.empty()) fail(user, fmt::format("images[{}] ({}) is not there", source, image.uri));
+    const std::string name = fmt::format("{}: images[{}]{}", path_, source, image.uri.empty() ? "" : ": " + image.uri);
+    const std::string_view bytes(reinterpret_cast<const char*>(image.image.data()), image.image.size());
+    return textures_.get_held(name, bytes, use, flags, user);
   }
   // One channel of an image as a texture of its own.
   int32_t channel_of(int index, size_t channel, const std::string& user) {
@@ -590,7 +580,6 @@ class Reader {
   std::string path_;
   SceneData scene_;
   gltf::Model model_;
-  UnpackFolder folder_;
   TextureStore textures_;
   VertexColours coloured_;
   std::map<std::pair<int, size_t>, int32_t> channels_;

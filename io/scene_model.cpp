@@ -41,16 +41,12 @@ std::string ending_of(const std::string& path) { return lower(fs::path(path).ext
 // Numbers of the scene's textures by those of the model's.
 std::vector<int32_t> read_textures(const Model& model, const std::string& path, SceneData& scene) {
   TextureStore store(scene.textures);
-  const UnpackFolder folder;
   std::vector<int32_t> numbers;
   for (const ModelTexture& texture : model.textures) {
     const std::string user = fmt::format("the model {}", path);
     if (!texture.bytes.empty()) {
-      const std::string file = (folder.path() / fmt::format("image{}", numbers.size())).string();
-      std::ofstream out(file, std::ios::binary);
-      out.write(texture.bytes.data(), static_cast<std::streamsize>(texture.bytes.size()));
-      if (!out.flush()) throw FileError(file, "cannot be written");
-      numbers.push_back(store.get(file, texture.use, texture.flags, user));
+      const std::string name = fmt::format("{}: its picture {} {}", path, numbers.size(), shown(texture.name));
+      numbers.push_back(store.get_held(name, texture.bytes, texture.use, texture.flags, user));
       continue;
     }
     const FoundFile file = find_beside(path, texture.name);

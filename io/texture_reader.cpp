@@ -1,4 +1,5 @@
 // Textures of any format through OpenImageIO.
+#include <OpenImageIO/filesystem.h>
 #include <fmt/format.h>
 
 #include <cmath>
@@ -10,15 +11,19 @@
 
 namespace lumicut::io::oiio {
 
-Texture read_texture(const std::string& path, TextureUse use, uint32_t flags, const std::string& user) {
+Texture read_texture(const std::string& path, std::string_view held, TextureUse use, uint32_t flags,
+                     const std::string& user) {
   std::error_code code;
-  if (!std::filesystem::exists(path, code)) throw FileError(path, fmt::format("no such texture, wanted by {}", user));
-  const auto input = open_image(path, "a texture of " + user);
+  if (held.empty() && !std::filesystem::exists(path, code))
+    throw FileError(path, fmt::format("no such texture, wanted by {}", user));
+  OIIO::Filesystem::IOMemReader memory(held.data(), held.size());
+  const std::string as = "a texture of " + user;
+  const auto input = held.empty() ? open_image(path, as) : open_held_image(path, as, held, memory);
   const OIIO::ImageSpec spec = input->spec();
   if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.deep)
     throw FileError(path, fmt::format("a texture of {} x {} x {} pixels cannot be used (by {})", spec.width,
                                       spec.height, spec.depth, user));
-  check_image_size(path, *input);
+  check_image_size(path, *input, held.empty() ? std::filesystem::file_size(path) : held.size());
   if (spec.nchannels < 1 || spec.nchannels > 4)
     throw FileError(path, fmt::format("has {} channels; 1 to 4 can be used (by {})", spec.nchannels, user));
 

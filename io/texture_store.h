@@ -3,6 +3,7 @@
 
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "io/scene_data.h"
@@ -22,10 +23,15 @@ class TextureStore {
   explicit TextureStore(std::vector<Texture>& textures) : textures_(textures) {}
   // 1 + index into the textures. `user` names who asks, for the error: "material \"leaf\"". Throws FileError.
   int32_t get(const std::string& path, TextureUse use, uint32_t flags, const std::string& user);
+  // The same for an image whose bytes another file holds; `name` says where it stands: "room.glb: images[3]".
+  int32_t get_held(const std::string& name, std::string_view bytes, TextureUse use, uint32_t flags,
+                   const std::string& user);
   // The same for a texture that is missing: one pixel of .5, linear.
   int32_t grey();
 
  private:
+  int32_t get(const std::string& key, const std::string& path, std::string_view held, TextureUse use, uint32_t flags,
+              const std::string& user);
   std::vector<Texture>& textures_;
   std::map<std::string, int32_t> known_;
 };

@@ -292,6 +292,31 @@ class Gltf(cli.Cli):
         self.refused(lambda d: d.json["materials"][0].update(pbrMetallicRoughness={"metallicFactor": "x"}),
                      "materials[0].pbrMetallicRoughness.metallicFactor")
 
+    def held(self, picture, name):
+        """A scene whose base colour is an image in its buffer."""
+        d = Document()
+        d.json["bufferViews"].append({"buffer": 0, "byteOffset": 0, "byteLength": len(picture)})
+        d.bytes += picture + b"\0" * (-len(picture) % 4)
+        d.json["images"], d.json["textures"] = [{"bufferView": 0, "mimeType": "image/png"}], [{"source": 0}]
+        d.node(mesh=d.square({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0}}, [0, 1, 1, 1, 1, 0, 0, 0]))
+        d.camera()
+        return d.write(self.folder / name)
+
+    def test_images_in_buffers_are_read_from_memory_and_named_by_their_place(self):
+        # No folder for temporary files: none is needed, so that none can stay behind.
+        nowhere = {"TMPDIR": str(self.folder / "none")}
+        for name in ("a.gltf", "a.glb"):
+            out = self.folder / "x.exr"
+            done = lumicut("render", self.held(png(1, 1, [(255, 0, 0)]), name), "-o", out, "--size", "4x4", "--layers", "albedo",
+                           "--vpls", "10", env=nowhere)
+            self.assert_ends(done, OK)
+            image = read_exr(out)
+            self.assertGreater(image["albedo.R"][5], 0.9)
+            self.assertLess(image["albedo.G"][5], 0.1)
+            for wrong in (b"no picture at all", png(1, 1, [(255, 0, 0)])[:40], b"\xff\xd8\xff"):
+                done = lumicut("convert", self.held(wrong, name), self.folder / "x.json", env=nowhere)
+                self.assert_ends(done, BAD_FILE, f"{name}: images[0]", "materials[0]")
+
 
 if __name__ == "__main__":
     unittest.main()
