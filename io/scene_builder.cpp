@@ -66,6 +66,21 @@ void vertex(Geometry& g, const Vec& p, const Vec& n, double u, double v) {
   for (const double x : n) g.normals.push_back(static_cast<float>(x));
   g.uvs.push_back(static_cast<float>(u)), g.uvs.push_back(static_cast<float>(v));
 }
+// Triangles without an area go, as at poles. The area of the others.
+double drop_slivers(Geometry& g) {
+  std::vector<uint32_t> kept;
+  double area = 0;
+  for (size_t i = 0; i + 2 < g.indices.size(); i += 3) {
+    Vec p[3];
+    for (size_t k = 0; k < 3; ++k) std::copy_n(&g.positions[3 * size_t{g.indices[i + k]}], 3, p[k].begin());
+    const double twice = length(cross(p[1] - p[0], p[2] - p[0]));
+    if (twice < 1e-9) continue;
+    area += twice / 2;
+    kept.insert(kept.end(), &g.indices[i], &g.indices[i] + 3);
+  }
+  g.indices = std::move(kept);
+  return area;
+}
 // A polygon around a circle has its area, or its length of arc, where its radius is so much larger.
 double polygon_growth(double step) { return std::sqrt(step / std::sin(step)); }
 
@@ -82,18 +97,8 @@ Geometry sphere_geometry() {
     const Vec n = place(s, t, 1);
     vertex(out, n, n, s, t);
   });
-  // Triangles without an area at the poles go; what is left grows to the sphere's area.
-  std::vector<uint32_t> kept;
-  double area = 0;
-  for (size_t i = 0; i < g.indices.size(); i += 3) {
-    Vec p[3];
-    for (size_t k = 0; k < 3; ++k) std::copy_n(&g.positions[3 * size_t{g.indices[i + k]}], 3, p[k].begin());
-    const double twice = length(cross(p[1] - p[0], p[2] - p[0]));
-    if (twice < 1e-9) continue;
-    area += twice / 2;
-    kept.insert(kept.end(), &g.indices[i], &g.indices[i] + 3);
-  }
-  g.indices = std::move(kept);
+  // What is left without the triangles at the poles grows to the sphere's area.
+  const double area = drop_slivers(g);
   const auto grow = static_cast<float>(std::sqrt(4 * kPi / area));
   for (float& x : g.positions) x *= grow;
   return g;
@@ -103,11 +108,13 @@ Geometry sphere_part_geometry(double z0, double z1, double sweep) {
   constexpr uint32_t kAround = 96, kUp = 48;
   const double low = std::asin(std::clamp(z0, -1.0, 1.0)), high = std::asin(std::clamp(z1, -1.0, 1.0));
   const double grow = polygon_growth(sweep / kAround);
-  return grid(kAround, kUp, [&](Geometry& g, double s, double t) {
+  Geometry out = grid(kAround, kUp, [&](Geometry& g, double s, double t) {
     const double phi = sweep * s, up = low + (high - low) * t;
     const Vec n{std::cos(up) * std::cos(phi), std::cos(up) * std::sin(phi), std::sin(up)};
     vertex(g, {n[0] * grow, n[1] * grow, n[2]}, n, s, t);
   });
+  drop_slivers(out);
+  return out;
 }
 
 Geometry rectangle_geometry() {
@@ -408,14 +415,30 @@ void SceneBuilder::set_bump(const PaintRef& height, double scale, lumicut_materi
   m.normal_texture = add_program(std::move(program)), m.normal_strength = 0;
 }
 
+namespace {
+// A paint and what it is multiplied by.
+std::pair<PaintRef, Vec> without_factor(PaintRef paint) {
+  Vec by{1, 1, 1};
+  while (paint->kind == Paint::Kind::product) {
+    const bool first = paint->a->kind == Paint::Kind::constant;
+    const PaintRef& constant = first ? paint->a : paint->b;
+    if (constant->kind != Paint::Kind::constant) break;
+    for (size_t k = 0; k < 3; ++k) by[k] *= constant->value[k];
+    paint = first ? paint->b : paint->a;
+  }
+  return {paint, by};
+}
+}  // namespace
+
 void SceneBuilder::set_colour(const PaintRef& paint, float* factor, int32_t& texture, double most) {
   texture = 0;
   if (const auto value = constant_of(paint)) {
     for (size_t k = 0; k < 3; ++k) factor[k] = static_cast<float>(std::clamp((*value)[k], 0.0, most));
     return;
   }
-  for (size_t k = 0; k < 3; ++k) factor[k] = 1;
-  texture = texture_of(decoded(paint, true));
+  const auto [rest, by] = without_factor(paint);
+  for (size_t k = 0; k < 3; ++k) factor[k] = static_cast<float>(std::clamp(by[k], 0.0, 1e6));
+  texture = texture_of(decoded(rest, true));
 }
 void SceneBuilder::set_number(const PaintRef& paint, float& factor, int32_t& texture) {
   texture = 0;
@@ -423,8 +446,10 @@ void SceneBuilder::set_number(const PaintRef& paint, float& factor, int32_t& tex
     factor = static_cast<float>(std::clamp((*value)[0], 0.0, 1.0));
     return;
   }
-  factor = 1;
-  texture = number_texture(paint);
+  const auto [rest, by] = without_factor(paint);
+  const bool apart = by[0] > 0 && by[0] <= 1;
+  factor = apart ? static_cast<float>(by[0]) : 1;
+  texture = number_texture(apart ? rest : paint);
 }
 
 uint32_t SceneBuilder::add_material(const std::string& name, const lumicut_material& values) {
