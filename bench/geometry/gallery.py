@@ -47,9 +47,16 @@ def main():
             run("net", "--points", instance, "--epsilon", 0.02, "--picture", out / "epsilon_net.png", "--size", 480, "--out", pathlib.Path(folder) / "n.csv")
         spiral = write("spiral.csv", [((4 + 0.05 * t) * math.cos(0.11 * t), (2 + 0.04 * t) * math.sin(0.11 * t)) for t in range(500)])
         run("hull", spiral, "--window", 220, "--summary", "--picture", out / "hull.png", "--size", 480)
+        tight, tight_disks, start = (pathlib.Path(folder) / name for name in ("tight.csv", "tight_disks.csv", "tight_start.csv"))
+        run("instance", "tight", "--side", 5, "--points", tight, "--disks", tight_disks, "--start", start)
+        for k in (3, 4):
+            run("hitting-set", "--points", tight, "--disks", tight_disks, "--method", "local", "--start", start, "--exchange", k,
+                "--picture", out / f"tight_{k}.png", "--size", 480, "--out", pathlib.Path(folder) / "h.csv")
+        run("independent-set", "--disks", disks, "--picture", out / "independent_set.png", "--size", 480, "--out", pathlib.Path(folder) / "i.csv")
         horse = scenes / "horse/horse.obj"
         if horse.exists() and not arguments.smoke:
             run("recluster", horse, "--z-up", "--frames", 6, "--amount", 0.16, "--reach", 0.35, "--clusters", 128, "--width", 320, "--height", 320, "--out", folder)
+            run("recluster", horse, "--frames", 1, "--clusters", 96, "--no-pictures", "--height", 480, "--atlas-picture", out / "atlas.png", "--out", folder + "/atlas")
             for i, frame in enumerate((0, 1, 3)):
                 (out / f"clusters_{i}.png").write_bytes((pathlib.Path(folder) / f"frame_000{frame}.png").read_bytes())
         elif not arguments.smoke:

@@ -22,7 +22,7 @@ namespace {
 
 struct Arguments {
   std::vector<std::string> meshes;  // the first one, then those of further frames
-  std::string out = ".", method = "kmeans", weights, metric = "sander", atlas;
+  std::string out = ".", method = "kmeans", weights, metric = "sander", atlas, atlas_picture;
   int frames = 30;
   FaceKmeansOptions kmeans;
   double error = 0;  // share of the surface; 0: none asked for
@@ -114,9 +114,14 @@ void save(const Arguments& a, int frame, const FaceMesh& mesh, const std::vector
 
 // Of the last frame.
 void save_atlas(const Arguments& a, const FaceMesh& mesh, const std::vector<uint32_t>& labels) {
-  if (a.atlas.empty()) return;
+  if (a.atlas.empty() && a.atlas_picture.empty()) return;
   const TextureAtlas atlas = make_texture_atlas(mesh, labels, a.gap);
-  write_text(a.atlas, obj_of(mesh, atlas));
+  if (!a.atlas.empty()) write_text(a.atlas, obj_of(mesh, atlas));
+  if (!a.atlas_picture.empty()) {
+    std::vector<Colour> colours;
+    for (const uint32_t label : labels) colours.push_back(label_colour(label));
+    write_text(a.atlas_picture, png_of(draw_atlas(atlas.corners, colours, a.height)));
+  }
   std::printf(
       "atlas: %zu charts cover %.1f %% of the square, are %.2f %% smaller than the surface; %zu faces turned away\n",
       atlas.charts, 100 * atlas.used, 100 * atlas.shrink, atlas.turned_away);
@@ -194,7 +199,8 @@ int run(const Arguments& a) {
     check_finite(name, value);
   if (!a.weights.empty() && a.method != "tree") fail_argument("--weights: of --method tree alone");
   if (a.error > 0 && a.method == "tree") fail_argument("--error: of --method kmeans alone");
-  if (!a.atlas.empty()) check_output(a.atlas);
+  check_output(a.atlas), check_output(a.atlas_picture);
+  io::check_distinct({a.atlas == "-" ? "" : a.atlas, a.atlas_picture});
   const Frames frames(a);
   std::filesystem::create_directories(a.out);
   return a.method == "tree" ? by_tree(a, frames) : by_kmeans(a, frames);
@@ -238,6 +244,7 @@ Command add_recluster(CLI::App& app) {
   command->add_flag("--simply-connected", a->tree.simply_connected,
                     "Of the tree: refuses changes that make clusters other than discs");
   command->add_option("--atlas", a->atlas, "OBJ with texture coordinates: a chart for each cluster of the last frame");
+  command->add_option("--atlas-picture", a->atlas_picture, "PNG of its charts, as high as --height");
   command->add_option("--gap", a->gap, "Between charts, in parts of the texture")->check(CLI::Range(0.0, 0.1));
   command->add_flag("--boxes", a->boxes, "Also a CSV of each frame's clusters' bounding boxes");
   command->add_option("--reach", a->reach, "Of the deformation, in diagonals")->check(CLI::Range(1e-6, 100.0));

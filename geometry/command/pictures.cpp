@@ -120,6 +120,28 @@ Picture draw_mesh(const FaceMesh& mesh, std::span<const Colour> colours, int wid
   return picture;
 }
 
+Picture draw_atlas(std::span<const std::array<Point2, 3>> corners, std::span<const Colour> colours, int size) {
+  Picture picture(size, size, {255, 255, 255});
+  for (size_t f = 0; f < corners.size(); ++f) {
+    std::array<Point2, 3> t = corners[f];
+    for (Point2& p : t) p = {p.x * size, (1 - p.y) * size};
+    const double area = (t[1].x - t[0].x) * (t[2].y - t[0].y) - (t[1].y - t[0].y) * (t[2].x - t[0].x);
+    if (area == 0) continue;
+    const auto [x0, x1] = std::minmax({t[0].x, t[1].x, t[2].x});
+    const auto [y0, y1] = std::minmax({t[0].y, t[1].y, t[2].y});
+    for (int y = std::max(0, static_cast<int>(y0)); y <= std::min(size - 1, static_cast<int>(y1)); ++y)
+      for (int x = std::max(0, static_cast<int>(x0)); x <= std::min(size - 1, static_cast<int>(x1)); ++x) {
+        bool inside = true;
+        for (size_t k = 0; k < 3; ++k) {
+          const Point2 &a = t[k], &b = t[(k + 1) % 3];
+          inside = inside && ((b.x - a.x) * (y + 0.5 - a.y) - (b.y - a.y) * (x + 0.5 - a.x)) * area >= 0;
+        }
+        if (inside) picture.set(x, y, colours[f]);
+      }
+  }
+  return picture;
+}
+
 std::string draw_circles(bool svg, std::span<const Point2> points, std::span<const Circle> circles,
                          std::span<const uint32_t> chosen, int size, std::span<const Point2> chain,
                          std::span<const Point2> polygon) {

@@ -32,6 +32,9 @@ Colour label_colour(uint32_t label);
 // The mesh from (1, .5, 2) of its box, z or y up, flat-shaded with a colour a face.
 Picture draw_mesh(const FaceMesh& mesh, std::span<const Colour> face_colours, int width, int height, bool z_up);
 
+// An atlas: the charts' triangles with a colour a face, on white. [geometry/texture_atlas.h]
+Picture draw_atlas(std::span<const std::array<Point2, 3>> corners, std::span<const Colour> face_colours, int size);
+
 struct Circle {
   Disk disk;
   Colour colour;

@@ -281,7 +281,7 @@ class GeometryCommand(unittest.TestCase):
     def test_an_atlas_and_boxes_of_the_last_frame_are_written(self):
         frames = [self.grid(f"sheet{i}.obj", i) for i in range(2)]
         atlas, out = self.folder / "atlas.obj", self.folder / "out"
-        done = run("recluster", *frames, "--clusters", 4, "--atlas", atlas, "--boxes", "--out", out, "--no-pictures")
+        done = run("recluster", *frames, "--clusters", 4, "--atlas", atlas, "--atlas-picture", self.folder / "atlas.png", "--boxes", "--out", out, "--no-pictures")
         self.assertEqual(done.returncode, 0, done.stderr)
         lines = [line.split() for line in atlas.read_text().splitlines()]
         uv = [[float(v) for v in line[1:]] for line in lines if line[0] == "vt"]
@@ -295,6 +295,7 @@ class GeometryCommand(unittest.TestCase):
             for v, _ in face:
                 self.assertTrue(all(boxes[label][k] - 1e-6 <= places[v][k] <= boxes[label][3 + k] + 1e-6 for k in range(3)))
         self.assertIn("4 charts", done.stdout)
+        self.assertTrue((self.folder / "atlas.png").read_bytes().startswith(b"\x89PNG"))
         self.refused("recluster", *frames, "--atlas", self.folder / "no/where.obj", says=["where.obj"])
 
     def test_metrics_seeds_filters_and_discs_are_options(self):
