@@ -12,6 +12,8 @@
 #include <memory>
 #include <utility>
 
+#include "core/current_work.h"
+
 namespace lumicut {
 
 // Threads that the hardware offers to this process.
@@ -21,7 +23,11 @@ int hardware_threads();
 template <typename Fn>
 void parallel_chunks(size_t n, size_t chunk, Fn&& fn) {
   const size_t chunks = (n + chunk - 1) / chunk;
-  tbb::parallel_for(size_t{0}, chunks, [&](size_t i) { fn(i * chunk, std::min(n, (i + 1) * chunk)); });
+  const Progress* work = CurrentWork::progress();
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, chunks, 1), [&](const tbb::blocked_range<size_t>& range) {
+    const CurrentWork current(work);  // the thread may have been in another's, which waits
+    for (size_t i = range.begin(); i < range.end(); ++i) fn(i * chunk, std::min(n, (i + 1) * chunk));
+  });
 }
 
 // threads - 1 workers, and the thread of each call beside them: a call never waits for another one's work to end, not even
@@ -38,7 +44,11 @@ class Arena {
   int threads() const { return threads_; }
   template <typename Fn>
   auto run(Fn&& fn) {
-    return arena_.execute(std::forward<Fn>(fn));
+    const Progress* work = CurrentWork::progress();
+    return arena_.execute([&] {
+      const CurrentWork current(work);  // another thread may take it over
+      return std::forward<Fn>(fn)();
+    });
   }
 
  private:

@@ -43,15 +43,16 @@ struct Pixels {
   }
 };
 
-void AtrousRows(const PaddedPlanes& guide, const PaddedPlanes& in, size_t step, size_t begin, size_t end,
-                PaddedPlanes& out) {
+template <size_t kPlanes>
+HWY_INLINE void FilterRows(const PaddedPlanes& guide, const PaddedPlanes& in, size_t step, size_t begin, size_t end,
+                           PaddedPlanes& out) {
   const D d;
   const auto s = static_cast<ptrdiff_t>(step);
   for (size_t y = begin; y < end; ++y)
     for (size_t x = 0; x < in.width(); x += hn::Lanes(d)) {
       const Pixels pixels(d, guide, x, y, static_cast<float>(step));
-      V sum[kFiltered], weights = hn::Set(d, 4.0f);
-      for (size_t k = 0; k < kFiltered; ++k) sum[k] = hn::Mul(weights, hn::LoadU(d, in.row(k, y) + x));
+      V sum[kPlanes], weights = hn::Set(d, 4.0f);
+      for (size_t k = 0; k < kPlanes; ++k) sum[k] = hn::Mul(weights, hn::LoadU(d, in.row(k, y) + x));
       for (ptrdiff_t i = -1; i <= 1; ++i) {
         const ptrdiff_t v = static_cast<ptrdiff_t>(y) + i * s;
         if (v < 0 || v >= static_cast<ptrdiff_t>(in.height())) continue;
@@ -63,12 +64,21 @@ void AtrousRows(const PaddedPlanes& guide, const PaddedPlanes& in, size_t step, 
           const V w = hn::Mul(hn::Set(d, binomial), pixels.Weight(d, guide, column, row, static_cast<float>(j * s),
                                                                   static_cast<float>(i * s)));
           weights = hn::Add(weights, w);
-          for (size_t k = 0; k < kFiltered; ++k) sum[k] = hn::MulAdd(w, hn::LoadU(d, in.row(k, row) + column), sum[k]);
+          for (size_t k = 0; k < kPlanes; ++k) sum[k] = hn::MulAdd(w, hn::LoadU(d, in.row(k, row) + column), sum[k]);
         }
       }
       const V scale = hn::Div(hn::Set(d, 1.0f), weights);
-      for (size_t k = 0; k < kFiltered; ++k) hn::StoreU(hn::Mul(sum[k], scale), d, out.row(k, y) + x);
+      for (size_t k = 0; k < kPlanes; ++k) hn::StoreU(hn::Mul(sum[k], scale), d, out.row(k, y) + x);
     }
+}
+
+void AtrousRows(const PaddedPlanes& guide, const PaddedPlanes& in, size_t step, size_t begin, size_t end,
+                PaddedPlanes& out) {
+  FilterRows<kFiltered>(guide, in, step, begin, end, out);
+}
+void AtrousFirstRows(const PaddedPlanes& guide, const PaddedPlanes& in, size_t step, size_t begin, size_t end,
+                     PaddedPlanes& out) {
+  FilterRows<kFirstFiltered>(guide, in, step, begin, end, out);
 }
 
 void SupportRows(const PaddedPlanes& guide, size_t begin, size_t end, PaddedPlanes& out) {
@@ -95,11 +105,16 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace lumicut {
 HWY_EXPORT(AtrousRows);
+HWY_EXPORT(AtrousFirstRows);
 HWY_EXPORT(SupportRows);
 
 void atrous_rows(const PaddedPlanes& guide, const PaddedPlanes& in, size_t step, size_t begin, size_t end,
                  PaddedPlanes& out) {
   HWY_DYNAMIC_DISPATCH(AtrousRows)(guide, in, step, begin, end, out);
+}
+void atrous_first_rows(const PaddedPlanes& guide, const PaddedPlanes& in, size_t step, size_t begin, size_t end,
+                       PaddedPlanes& out) {
+  HWY_DYNAMIC_DISPATCH(AtrousFirstRows)(guide, in, step, begin, end, out);
 }
 void support_rows(const PaddedPlanes& guide, size_t begin, size_t end, PaddedPlanes& out) {
   HWY_DYNAMIC_DISPATCH(SupportRows)(guide, begin, end, out);

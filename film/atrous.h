@@ -38,12 +38,14 @@ struct Guide {
   static constexpr float kFar = 1e4f;  // of features in the margin: like nothing
 };
 
-// How many planes are filtered at once.
-inline constexpr size_t kFiltered = 9;
+// How many planes are filtered at once: all, or the first few.
+inline constexpr size_t kFiltered = 8, kFirstFiltered = 3;
 
 // Rows [begin, end): of `in` into `out`.
 void atrous_rows(const PaddedPlanes& guide, const PaddedPlanes& in, size_t step, size_t begin, size_t end,
                  PaddedPlanes& out);
+void atrous_first_rows(const PaddedPlanes& guide, const PaddedPlanes& in, size_t step, size_t begin, size_t end,
+                       PaddedPlanes& out);
 // Of the eight nearest pixels, the mean weight: 1 inside a surface, near 0 where a pixel is like none of them.
 void support_rows(const PaddedPlanes& guide, size_t begin, size_t end, PaddedPlanes& out);
 

@@ -1,6 +1,7 @@
 #include "film/denoise.h"
 
 #include <array>
+#include <vector>
 
 #include "core/parallel.h"
 #include "film/atrous.h"
@@ -21,14 +22,16 @@ constexpr float kLeastAlbedo = 0.02f;  // what is darker is not divided by less
 constexpr float kLoosening = 3.0f, kEnoughSupport = 0.25f;
 // A pass is a firefly where it alone brings more than this share of what its surroundings show.
 constexpr float kVisibleDot = 0.5f;
+// Fireflies are spread so widely that this many of them overlap: a caustic that many have met keeps its shape.
+constexpr float kOverlap = 32.0f;
 
 // Levels are weighted by estimates of their error, so those that chance made small count most, and the mean is too small.
 // By so much, as test_denoise and the scenes in docs/progressive.md measure it.
 constexpr double kOfChoice = 1.5;
 
-// Planes that are filtered: both halves' common part, and what fireflies bring to the mean.
-enum Filtered : size_t { kOdd = 0, kEven = 3, kRare = 6 };
-static_assert(kFiltered == 9);
+// Planes that are filtered: both halves' common part; of what fireflies bring to the mean the luminance and its square.
+enum Filtered : size_t { kOdd = 0, kEven = 3, kRare = 6, kRareSquare = 7 };
+static_assert(kFiltered == 8);
 
 Rgb over(const Rgb& a, const Rgb& b) { return {a.x / b.x, a.y / b.y, a.z / b.z}; }
 
@@ -45,6 +48,8 @@ class Denoiser {
         from_(kFiltered, width_, height_),
         to_(kFiltered, width_, height_),
         albedo_(3, width_, height_),
+        rare_(3, width_, height_),
+        spread_(width_ * height_, 0),
         result_(kResults, width_, height_),
         wrong_(width_, height_),
         varies_(width_, height_) {}
@@ -57,7 +62,9 @@ class Denoiser {
       rows([&](size_t begin, size_t end) { atrous_rows(guide_, from_, size_t{1} << level, begin, end, to_); });
       std::swap(from_, to_);
       weigh_level();
+      choose_spread(level);
     }
+    spread_rare();
     write();
   }
 
@@ -71,7 +78,8 @@ class Denoiser {
     kOddBefore = 5,
     kEvenBefore = 6,
     kErrorBefore = 7,
-    kResults = 8
+    kResults = 8,
+    kRareWidely = kOddBefore  // once levels are weighed: of fireflies the luminance, spread as widely as anything
   };
 
   template <typename Fn>
@@ -165,11 +173,43 @@ class Denoiser {
       }
       const auto mean = [&](const Rgb& sum, float count) { return over(max(sum, Rgb{}), a) * (1.0f / count); };
       store(from_, kOdd, x, y, mean(halves[0], odd)), store(from_, kEven, x, y, mean(halves[1], even));
-      store(from_, kRare, x, y, mean(rare, n));
+      const Rgb over_albedo = mean(rare, n);
+      store(rare_, 0, x, y, over_albedo);
+      const float l = luminance(over_albedo);
+      from_.row(kRare, y)[x] = l, from_.row(kRareSquare, y)[x] = l * l;
       result_.row(kOddBefore, y)[x] = luminance(read(from_, kOdd, x, y) * a);
       result_.row(kEvenBefore, y)[x] = luminance(read(from_, kEven, x, y) * a);
       set(Channel::denoising_color, x, y, color(Channel::radiance, x, y) - rare * (1.0f / n));
     });
+  }
+
+  // How many fireflies overlap where `level` and those before it spread them: (sum of light)² / sum of light², over the
+  // kernel's area, which is that of a pyramid.
+  void choose_spread(size_t level) {
+    const float area = 2.25f * static_cast<float>(size_t{1} << (2 * level + 2));
+    pixels([&](size_t x, size_t y) {
+      uint8_t& chosen = spread_[y * width_ + x];
+      if (chosen != 0 || !(max_component(read(rare_, 0, x, y)) > 0.0f)) return;
+      const float light = from_.row(kRare, y)[x];
+      if (level + 1 == kLevels || area * light * light > kOverlap * from_.row(kRareSquare, y)[x])
+        chosen = static_cast<uint8_t>(level + 1);
+    });
+  }
+
+  // What fireflies bring, each spread by as many levels as it needs: from the widest on, since levels follow each other in
+  // any order, so that each joins where its own begin. Into the first planes of from_.
+  void spread_rare() {
+    pixels([&](size_t x, size_t y) {
+      result_.row(kRareWidely, y)[x] = from_.row(kRare, y)[x];
+      store(from_, 0, x, y, Rgb{});
+    });
+    for (size_t level = kLevels; level-- > 0;) {
+      pixels([&](size_t x, size_t y) {
+        if (spread_[y * width_ + x] == level + 1) store(from_, 0, x, y, read(from_, 0, x, y) + read(rare_, 0, x, y));
+      });
+      rows([&](size_t begin, size_t end) { atrous_first_rows(guide_, from_, size_t{1} << level, begin, end, to_); });
+      std::swap(from_, to_);
+    }
   }
 
   // Adds what the halves are now to the sums, by how far from the truth they seem to be.
@@ -210,7 +250,7 @@ class Denoiser {
     const auto n = static_cast<double>(options_.passes);
     const double t = student_t(options_.confidence, options_.passes);
     pixels([&](size_t x, size_t y) {
-      const Rgb a = albedo(x, y), rare = read(from_, kRare, x, y) * a;
+      const Rgb a = albedo(x, y), rare = read(from_, 0, x, y) * a;
       const float per_weight = 1.0f / result_.row(kWeight, y)[x];
       const Rgb radiance = color(Channel::radiance, x, y), residual = color(Channel::residual, x, y);
       set(Channel::denoised, x, y, radiance - residual + read(result_, kSum, x, y) * per_weight * a + rare);
@@ -223,7 +263,9 @@ class Denoiser {
           squares += static_cast<double>(sums_[v * width_ + u].squares);
       const double rest = squares / count / (n * (n - 1.0));
       const double filtered = static_cast<double>(result_.row(kError, y)[x] * per_weight);
-      const double spread = static_cast<double>(luminance(rare));
+      // Where none was met in this pixel's surroundings, one may have been missed.
+      const double spread =
+          static_cast<double>(std::max(luminance(rare), result_.row(kRareWidely, y)[x] * luminance(a)));
       set(Channel::denoised_error, x, y,
           static_cast<float>(t * std::sqrt(rest + kOfChoice * filtered + spread * spread)));
     });
@@ -234,14 +276,16 @@ class Denoiser {
   const Progress& progress_;
   Film& film_;
   const size_t width_, height_;
-  PaddedPlanes guide_, from_, to_, albedo_, result_;
+  PaddedPlanes guide_, from_, to_, albedo_, rare_;
+  std::vector<uint8_t> spread_;  // by how many levels the pixel's fireflies are; 0: it has none
+  PaddedPlanes result_;
   CoarsePlane wrong_, varies_;
   bool first_ = true;
 };
 
 }  // namespace
 
-uint64_t denoising_pixel_bytes() { return (Guide::kPlanes + 2 * kFiltered + 3 + 8) * sizeof(float) + 1; }
+uint64_t denoising_pixel_bytes() { return (Guide::kPlanes + 2 * kFiltered + 3 + 3 + 8) * sizeof(float) + 2; }
 
 void denoise(const DenoiseOptions& options, std::span<const ResidualSums> sums, const Progress& progress, Film& film) {
   if (options.passes >= 2) Denoiser(options, sums, progress, film).run();

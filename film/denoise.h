@@ -5,7 +5,7 @@
 // 2010]. How wide, each place decides by the error of the one half of the passes filtered against the other as it is, an
 // unbiased estimate of bias and variance together. [Rousselle et al. 2011, 2012; the halves as in Bitterli et al. 2016]
 //
-// A pass that is so bright in a pixel that it would show as a dot is spread as widely as anything is. No light is lost by
+// A pass that is so bright in a pixel that it would show as a dot is spread until many of them overlap. No light is lost by
 // that; what is spread becomes less with the number of passes, as each counts for less.
 #pragma once
 

@@ -15,7 +15,6 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <map>
 #include <mutex>
 #include <random>
 #include <set>
@@ -243,21 +242,27 @@ int open_stream(const std::string& path, const fs::path& place) {
 
 }  // namespace
 
-void check_distinct(const std::vector<std::string>& paths) {
-  std::map<fs::path, std::string> seen;
-  for (const std::string& path : paths) {
-    if (path.empty()) continue;
+void check_distinct(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs) {
+  std::set<fs::path> seen;
+  const auto is_new = [&](const std::string& path) {
+    if (path.empty()) return true;
     Target target;
     try {
       target = find_target(path);
     } catch (const FileError&) {
-      continue;  // whoever writes there says so
+      return true;  // whoever writes there says so
     }
-    if (target.kind != Target::Kind::file) continue;
+    if (target.kind != Target::Kind::file) return true;
     std::error_code code;
     const fs::path place = fs::weakly_canonical(fs::absolute(target.path, code), code);
-    if (!seen.emplace(code ? target.path : place, path).second)
-      throw FileError(path, "is where two outputs shall be written");
+    return seen.insert(code ? target.path : place).second;
+  };
+  for (const std::string& path : outputs)
+    if (!is_new(path)) throw FileError(path, "is where two outputs shall be written");
+  const std::set<fs::path> written = seen;
+  for (const std::string& path : inputs) {
+    if (!is_new(path)) throw FileError(path, "is read, and an output shall not take its place");
+    seen = written;  // inputs may be named twice
   }
 }
 

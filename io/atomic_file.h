@@ -14,9 +14,9 @@
 
 namespace lumicut::io {
 
-// Throws FileError when two of the paths (empty ones aside) are the same file, by whatever name: the one would take the
-// place of the other. Devices and pipes may be named twice.
-void check_distinct(const std::vector<std::string>& paths);
+// Throws FileError when two of the outputs (empty ones aside) are the same file, by whatever name, or one is an input: the
+// one would take the place of the other. Devices and pipes may be named twice.
+void check_distinct(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs = {});
 
 // Throws FileError when a file of so many bytes cannot be written at `path` (links, devices and pipes: nothing): before
 // hours of work, not after. Changes nothing.

@@ -54,8 +54,13 @@ class ProgramReader {
     if (auto name = object.find("attribute")) {
       if (out.count != 0) name->fail("stands beside a \"table\"");
       out.data = attribute_(name->text());
+    } else if (out.op == LUMICUT_OP_ATTRIBUTE) {
+      object.need("attribute");
     }
-    if (auto image = object.find("image")) out.data = static_cast<uint32_t>(image_(*image));
+    if (auto image = object.find("image")) {
+      if (out.op != LUMICUT_OP_IMAGE) image->fail("stands in a step that is no image");
+      out.data = static_cast<uint32_t>(image_(*image));
+    }
     object.finish();
     program_.instructions.push_back(out);
   }

@@ -417,6 +417,10 @@ class Writer {
 
 void write_scene(const SceneData& scene, const std::string& path) {
   check_writable(path);
+  const std::string name = std::filesystem::path(path).filename().string();
+  if (Json(name).dump(-1, ' ', false, Json::error_handler_t::replace) !=
+      Json(name).dump(-1, ' ', false, Json::error_handler_t::ignore))
+    throw FileError(path, "is a name that is no UTF-8: the scene could not name its files, which lie beside it");
   Files files(path);
   const Json json = Writer(scene, files).write();
   write_whole_file(path, json_text(json, 1) + "\n");

@@ -110,13 +110,12 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
 std::vector<PathVpl> trace_light_paths(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
                                        const CameraImportance* importance, uint64_t first, uint64_t last,
                                        Progress& progress) {
-  const size_t chunks = (last - first + kPathsPerChunk - 1) / kPathsPerChunk;
-  std::vector<std::vector<PathVpl>> parts(chunks);
-  tbb::parallel_for(size_t{0}, chunks, [&](size_t c) {
+  std::vector<std::vector<PathVpl>> parts((last - first + kPathsPerChunk - 1) / kPathsPerChunk);
+  parallel_chunks(last - first, kPathsPerChunk, [&](size_t begin, size_t end) {
     if (progress.cancelled()) return;
-    parts[c] = trace_paths(scene, emitters, options, importance, first + c * kPathsPerChunk,
-                           std::min(last, first + (c + 1) * kPathsPerChunk));
-    progress.advance(parts[c].size());
+    std::vector<PathVpl>& part = parts[begin / kPathsPerChunk];
+    part = trace_paths(scene, emitters, options, importance, first + begin, first + end);
+    progress.advance(part.size());
   });
   progress.check();
   std::vector<PathVpl> all;

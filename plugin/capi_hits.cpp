@@ -29,10 +29,12 @@ lumicut_result trace(lumicut_scene scene, const lumicut_render_desc* frame, uint
     if (desc.passes != 1) options.camera_samples = {seed, pass * options.samples};
     const Rect part = part_of(options.crop, rect);
     const size_t count = size_t{part.width()} * part.height() * options.samples;
-    const Progress progress;
+    const std::shared_ptr<Progress> progress = s.work.share();
+    const CurrentWork current(progress.get());
     s.device->arena.run([&] {
-      first_hits(s.scene, options, part, {reinterpret_cast<FirstHit*>(hits), count}, progress);
+      first_hits(s.scene, options, part, {reinterpret_cast<FirstHit*>(hits), count}, *progress);
     });
+    progress->check();
   });
 }
 

@@ -140,11 +140,12 @@ lumicut_result lumicut_integrator_shade(lumicut_integrator integrator, const lum
     if (s.changed || p.scene_version != s.scene.version())
       fail_state("lumicut_integrator: its scene was changed since lumicut_integrator_prepare");
     const std::shared_ptr<Progress> progress = i.work.share();
+    const CurrentWork current(progress.get());
     const Scene& scene = s.scene;
     i.device->arena.run([&] {
       check_points(scene, points, count);
       const auto batches = batches_of(points, count, std::max<size_t>(1, p.method->batch_size()));
-      tbb::parallel_for(size_t{0}, batches.size(), [&](size_t b) {
+      parallel_chunks(batches.size(), 1, [&](size_t b, size_t) {
         progress->check();
         const auto [first, last] = batches[b];
         ShadePoints batch;
@@ -160,6 +161,7 @@ lumicut_result lumicut_integrator_shade(lumicut_integrator integrator, const lum
           for (size_t k = 0; k < hits.light.size(); ++k) light[hits.pixel[k]] += hits.light[k];
           i.stats->add(counters);
         }
+        progress->check();
         for (size_t k = 0; k < starts.size(); ++k) {
           const size_t end = k + 1 < starts.size() ? starts[k + 1] : light.size();
           Rgb sum = light[starts[k]];

@@ -48,6 +48,7 @@ class Work {
 template <typename Fn>
 void run_work(Work& work, Fn&& fn) {
   const std::shared_ptr<Progress> progress = work.begin();
+  const CurrentWork current(progress.get());
   try {
     fn(*progress);
     work.end(LUMICUT_DONE);

@@ -365,6 +365,7 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
   tbb::parallel_for(
       tbb::blocked_range<size_t>(0, batches.size(), 1),
       [&](const tbb::blocked_range<size_t>& range) {
+        const CurrentWork current(&context.progress);
         for (size_t b = range.begin(); b < range.end(); ++b) {
           context.progress.check();
           Batch batch(scene, methods, options, camera, light_surfaces ? &*light_surfaces : nullptr);

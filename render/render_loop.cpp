@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "core/current_work.h"
 #include "film/denoise.h"
 #include "render/checkpoint.h"
 #include "render/traced_gloss.h"
@@ -72,6 +73,7 @@ std::vector<GroupMethod> RenderLoop::methods(const Prepared& prepared, std::vect
 }
 
 void RenderLoop::run(Progress& progress, Stats& stats, const std::function<void(const Rect&)>& tile_done) {
+  const CurrentWork current(&progress);
   progress.check();
   if (progressive_) return render_iterations(progress, stats, tile_done);
   preparation_.prepare(scene_, scene_owner_, preparation_.params, progress, stats, whole_frame());

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/current_work.h"
 #include "core/error.h"
 #include "core/number_text.h"
 #include "scene/camera.h"
@@ -676,8 +677,11 @@ Rgb TextureProgram::evaluate(const ProgramPoint& point, std::span<const Texture>
   // Left as it is: most programs use little of it.
   alignas(Vec3f) unsigned char memory[kMostInstructions * sizeof(Vec3f)];
   auto* values = reinterpret_cast<Vec3f*>(memory);
-  for (size_t i = 0; i < instructions_.size(); ++i)
+  for (size_t i = 0; i < instructions_.size(); ++i) {
+    // A thousand noises take longer than a cancel may.
+    if (i % 16 == 0 && CurrentWork::cancelled()) return {};
     new (&values[i]) Vec3f(value(instructions_[i], point, textures, values, false));
+  }
   const Vec3f& last = values[instructions_.size() - 1];
   return is_finite(last) ? last : each(last, [](float x) { return std::isfinite(x) ? x : 0.0f; });
 }

@@ -90,7 +90,7 @@ void write_error_map(const std::string& path, std::vector<float> errors, const i
 void compare(const Options& options) {
   const std::vector<std::string> outputs = {options.error_image, options.flip_image, options.hdr_flip_image,
                                             options.error_map, options.signed_error_map};
-  io::check_distinct(outputs);
+  io::check_distinct(outputs, {options.image, options.reference});
   for (const auto& path : outputs)
     if (!path.empty()) io::check_writable(path);
   io::Image a, b;

@@ -19,7 +19,7 @@ struct Options {
 
 void convert(const Options& o) {
   if (!o.output.ends_with(".json")) throw UsageError(fmt::format("{}: the scene to write must end in .json", o.output));
-  io::check_distinct({o.scene, o.output});
+  io::check_distinct({o.output}, {o.scene});
   io::check_writable(o.output);
   const io::SceneData scene = read_scene_file(o.scene);
   tell_warnings(scene.warnings, o.scene, o.strict);

@@ -119,7 +119,7 @@ class FlythroughCommand {
 
   void run() {
     const std::vector<uint32_t> size = o_.size.empty() ? std::vector<uint32_t>{} : image_size(o_.size);
-    io::check_distinct({o_.output, o_.png, o_.stats, o_.save_state});
+    io::check_distinct({o_.output, o_.png, o_.stats, o_.save_state}, {o_.scene, o_.cameras, o_.vpl_in, o_.load_state});
     for (const auto& path : {o_.output, o_.png, o_.stats, o_.save_state})
       if (!path.empty()) io::check_writable(path);
     create();

@@ -102,7 +102,7 @@ void add_mix(CLI::App& app) {
   command->footer("Example: lumicut mix room.exr --gain 1=0 --gain 2=1,0.8,0.6 -o evening.exr --png evening.png");
   command->callback([o] {
     if (o->output.empty() && o->png.empty()) throw UsageError("mix: nothing to write; give -o out.exr or --png");
-    io::check_distinct({o->output, o->png});
+    io::check_distinct({o->output, o->png}, {o->input});
     mix(*o);
   });
 }

@@ -124,7 +124,7 @@ class RenderCommand {
     std::vector<std::string> outputs = {o_.output, o_.png, o_.stats, o_.vpl_out, o_.checkpoint};
     if (!o_.heat_maps.empty())
       for (const CountLayer& layer : kCountLayers) outputs.push_back(heat_map_path(layer));
-    io::check_distinct(outputs);
+    io::check_distinct(outputs, {o_.scene, o_.vpl_in});
     for (const auto& path : {o_.output, o_.png, o_.stats, o_.vpl_out})
       if (!path.empty()) io::check_writable(path);
     if (!o_.heat_maps.empty()) {
@@ -158,10 +158,20 @@ class RenderCommand {
   void create_integrator() {
     create_integrator(integrator_);
     check_groups(api(), o_, o_.groups);
+    check_lights_out();
     if (o_.vpl_in.empty()) return;
     const NothingToLose reading;
     lights_ = io::read_vpls(o_.vpl_in);
     if (lights_.lights.empty()) throw UsageError(fmt::format("--vpl-in {}: holds no light", o_.vpl_in));
+  }
+
+  void check_lights_out() const {
+    if (o_.vpl_out.empty()) return;
+    if (lacks(integrator_info(api(), o_.integrator), LUMICUT_VIRTUAL_LIGHTS))
+      throw UsageError(fmt::format("--vpl-out: {} has no virtual lights", o_.integrator));
+    const char* importance = api().integrator_get(integrator_.get(), "importance");
+    if (importance != nullptr && std::string(importance) == "1")
+      throw UsageError("--vpl-out: not with importance, whose lights are for one camera (-p importance=false)");
   }
 
   void read_scene() {

@@ -263,6 +263,7 @@ std::string page(const ordered_json& results, const std::string& file, int most)
 void report(const Options& o) {
   std::string output = o.output;
   if (output.empty()) output = (std::filesystem::path(o.results).parent_path() / "report.html").string();
+  io::check_distinct({output}, {o.results});
   io::check_writable(output);
   const auto results = io::parse_json<ordered_json>(io::read_whole_file(o.results), o.results);
   if (!results.is_object() || !results.contains("format") || results["format"] != "lumicut-bench/1")

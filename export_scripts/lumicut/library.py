@@ -520,10 +520,19 @@ def _array(cls, items):
     return (cls * len(items))(*items), len(items)
 
 
-def _rows(a, dtype, width):
-    """The array as the library wants it: packed, of this type, `width` columns. None stays None."""
+def _rows(name, a, dtype, width):
+    """The array as the library wants it: packed, of this type, `width` columns. None stays None. What would become another
+    array is refused: other shapes than (n, width), flat, and (n, 3, 4) for 12; indices that are not whole or beyond 32 bits."""
     if a is None:
         return None
+    a = np.asarray(a)
+    flat, rows = a.ndim == 1 and a.size % width == 0, a.ndim == 2 and a.shape[1] == width
+    if not (flat or rows or a.size == 0 or width == 12 and a.ndim == 3 and a.shape[1:] == (3, 4)):
+        raise Error(INVALID_ARGUMENT, f"{name}: has the shape {a.shape}, not (n, {width})")
+    if dtype == np.uint32 and a.size and (a.dtype.kind not in "iu" or a.min() < 0 or a.max() > NO_ID):
+        raise Error(INVALID_ARGUMENT, f"{name}: whole numbers from 0 to {NO_ID} are wanted")
+    if a.size and a.dtype.kind not in "fiu":
+        raise Error(INVALID_ARGUMENT, f"{name}: are of the type {a.dtype}, not numbers")
     a = np.ascontiguousarray(a, dtype)
     return a.reshape(-1, width) if width > 1 else a.reshape(-1)
 
@@ -541,16 +550,21 @@ class Scene(Handle):
         items, kept = [], []
         for texture in textures:
             if len(texture) == 3:
-                instructions, constants, table = kept_arrays = (_rows(texture[0], np.int32, 12), _rows(texture[1], np.float32, 3),
-                                                                _rows(texture[2], np.float32, 1))
+                instructions, constants, table = kept_arrays = (_rows("instructions", texture[0], np.int32, 12), _rows("constants", texture[1], np.float32, 3),
+                                                                _rows("table", texture[2], np.float32, 1))
                 program = Program(instruction_count=len(instructions), constant_count=len(constants), table_count=len(table),
                                   instructions=instructions.ctypes.data, constants=constants.ctypes.data, table=table.ctypes.data)
                 kept.append((program, kept_arrays))
                 items.append(Texture(program=ctypes.addressof(program)))
                 continue
             pixels, flags = texture
+            if pixels.ndim != 3:
+                raise Error(INVALID_ARGUMENT, f"textures[{len(items)}]: have the shape {pixels.shape}, not (h, w, channels)")
             height, width, channels = pixels.shape
-            assert pixels.flags.c_contiguous and pixels.dtype in (np.uint8, np.float32)
+            if pixels.dtype not in (np.uint8, np.float32):
+                raise Error(INVALID_ARGUMENT, f"textures[{len(items)}]: are of the type {pixels.dtype}, not uint8 or float32")
+            pixels = np.ascontiguousarray(pixels)
+            kept.append(pixels)
             items.append(Texture(width=width, height=height, channels=channels, flags=flags, pixels=pixels.ctypes.data,
                                  format=UINT8 if pixels.dtype == np.uint8 else FLOAT32))
         self._call("scene_set_textures", *_array(Texture, items))
@@ -588,9 +602,9 @@ class Scene(Handle):
     def add_mesh(self, positions, indices, normals=None, uvs=None, materials=None, material=0, transforms=None, group=0, mask=0,
                  attributes=()):
         """`attributes`: (id, domain, values) each, a row of `values` for each place."""
-        positions, normals, uvs = _rows(positions, np.float32, 3), _rows(normals, np.float32, 3), _rows(uvs, np.float32, 2)
-        indices, materials = _rows(indices, np.uint32, 3), _rows(materials, np.uint32, 1)
-        transforms = _rows(transforms, np.float32, 12)
+        positions, normals = _rows("positions", positions, np.float32, 3), _rows("normals", normals, np.float32, 3)
+        uvs, transforms = _rows("uvs", uvs, np.float32, 2), _rows("transforms", transforms, np.float32, 12)
+        indices, materials = _rows("indices", indices, np.uint32, 3), _rows("materials", materials, np.uint32, 1)
         for name, a in (("normals", normals), ("uvs", uvs)):
             if a is not None and len(a) != len(positions):
                 raise Error(INVALID_ARGUMENT, f"{name}: {len(a)} for {len(positions)} vertices")
@@ -702,7 +716,7 @@ class Accel(Handle):
 
     def __init__(self, device, positions, indices, kind=None, builder=None, robust=True):
         super().__init__(device.library)
-        positions, indices = _rows(positions, np.float32, 3), _rows(indices, np.uint32, 3)
+        positions, indices = _rows("positions", positions, np.float32, 3), _rows("indices", indices, np.uint32, 3)
         self._create("accel_build", device.pointer, ctypes.byref(AccelDesc(
             robust=ROBUST if robust else FAST, kind=kind.encode() if kind else None, builder=builder.encode() if builder else None,
             positions=positions.ctypes.data, position_count=len(positions), indices=indices.ctypes.data, triangle_count=len(indices))))

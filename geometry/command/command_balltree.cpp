@@ -86,7 +86,7 @@ std::string draw(const Arguments& a, const BallTree& tree, const Balls& balls) {
 int run(const Arguments& a) {
   check_output(a.picture);
   if (!a.queries.empty()) check_output(a.out);
-  io::check_distinct({a.queries.empty() || a.out == "-" ? "" : a.out, a.picture});
+  io::check_distinct({a.queries.empty() || a.out == "-" ? "" : a.out, a.picture}, {a.balls, a.queries});
   const Balls balls = read_balls(a.balls, a.radii);
   if (!a.picture.empty() && balls.dimension != 2)
     fail_argument("--picture: " + a.balls + " has " + std::to_string(balls.dimension) +

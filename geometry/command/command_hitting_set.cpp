@@ -71,7 +71,7 @@ std::vector<uint32_t> solve(const Arguments& a, const std::vector<Point2>& point
 
 int run(const Arguments& a) {
   check_output(a.out);
-  io::check_distinct({a.out == "-" ? "" : a.out, a.picture});
+  io::check_distinct({a.out == "-" ? "" : a.out, a.picture}, {a.points, a.disks, a.ranges, a.start});
   check_output(a.picture);
   if (a.disks.empty() == a.ranges.empty()) fail_argument("either --disks or --ranges is wanted");
   if (!a.shape.empty() && a.disks.empty()) fail_argument("--shape: not with --ranges");

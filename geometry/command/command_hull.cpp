@@ -10,6 +10,7 @@
 #include "geometry/command/commands.h"
 #include "geometry/command/pictures.h"
 #include "geometry/dynamic_hull.h"
+#include "io/atomic_file.h"
 
 namespace lumicut {
 namespace {
@@ -68,6 +69,7 @@ std::string draw(const Arguments& a, const std::deque<Point2>& window, const Dyn
 
 int run(const Arguments& a) {
   check_output(a.picture);
+  io::check_distinct({a.picture}, {a.stream == "-" ? "" : a.stream});
   std::istringstream file;
   if (a.stream != "-") file = open_text(a.stream);
   std::istream& in = a.stream == "-" ? std::cin : file;

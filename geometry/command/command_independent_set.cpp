@@ -19,7 +19,7 @@ struct Arguments {
 
 int run(const Arguments& a) {
   check_output(a.out), check_output(a.picture);
-  io::check_distinct({a.out == "-" ? "" : a.out, a.picture});
+  io::check_distinct({a.out == "-" ? "" : a.out, a.picture}, {a.disks, a.start});
   auto file = open_text(a.disks);
   const std::vector<Disk> disks = read_disks_csv(file, a.disks);
   std::vector<uint32_t> from;

@@ -27,7 +27,7 @@ int run(const Arguments& a) {
 #ifdef LUMICUT_HAS_CGAL
   check_finite("--c0", a.c0);
   check_output(a.out), check_output(a.picture);
-  io::check_distinct({a.out == "-" ? "" : a.out, a.picture});
+  io::check_distinct({a.out == "-" ? "" : a.out, a.picture}, {a.points, a.weights});
   auto file = open_text(a.points);
   const auto points = read_points_csv(file, a.points);
   std::vector<double> weights;

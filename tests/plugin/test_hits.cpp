@@ -1,6 +1,8 @@
 // Extension "lumicut.hits/1": what camera rays meet is what channels show.
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <thread>
 #include <vector>
 
 #include "box_scene.h"
@@ -63,6 +65,25 @@ TEST(Hits, RectanglesArePartsOfTheWhole) {
       EXPECT_EQ(a.u, b.u);
       EXPECT_EQ(a.v, b.v);
     }
+}
+
+TEST(Hits, EndWhenTheSceneIsCancelled) {
+  const api::Device device(1);
+  const api::Scene s = scene(device);
+  auto frame = box::frame(2000, 200);
+  frame.passes = 1, frame.samples = 16;
+  std::vector<lumicut_first_hit> hits(size_t{2000} * 200 * 16);
+  std::atomic<bool> over{false};
+  std::thread other([&] {
+    while (!over) lumicut_cancel(s.get());  // the first may come before there is anything to cancel
+  });
+  const lumicut_result result = hits_table().trace(s.get(), &frame, 1, 0, nullptr, hits.data());
+  over = true;
+  other.join();
+  EXPECT_EQ(result, LUMICUT_CANCELLED);
+  hits.resize(16);
+  frame = box::frame(4, 4);
+  EXPECT_EQ(hits_table().trace(s.get(), &frame, 1, 0, nullptr, hits.data()), LUMICUT_OK) << lumicut_last_error();
 }
 
 TEST(Hits, WrongInputIsAnError) {

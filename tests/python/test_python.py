@@ -135,7 +135,16 @@ class Package(unittest.TestCase):
                            ("colour", lambda: lumicut.render(scene, "lightcuts", 8, 8, vpls=10, colour=1)),
                            (r"shape \(3,\)", lambda: lumicut.Accel(self.device, *FLOOR).intersect([1, 2, 3], [0, 0, 1])),
                            ("1 for 2 lights", lambda: lumicut.Integrator(self.device, "lightcuts").set_lights(
-                               np.zeros(2, lumicut.VPL), np.zeros(1, lumicut.VPL_ORIGIN)))):
+                               np.zeros(2, lumicut.VPL), np.zeros(1, lumicut.VPL_ORIGIN))),
+                           (r"textures\[0\].*float16", lambda: scene.set_textures([(np.zeros((2, 2, 4), np.float16), 0)])),
+                           (r"textures\[0\].*shape \(2, 2\)", lambda: scene.set_textures([(np.zeros((2, 2), np.float32), 0)])),
+                           ("indices: whole", lambda: scene.add_mesh(FLOOR[0], [[2**32, 1, 2]])),
+                           ("indices: whole", lambda: scene.add_mesh(FLOOR[0], [[np.nan, 1, 2]])),
+                           ("indices: whole", lambda: lumicut.Accel(self.device, FLOOR[0], [[-1, 1, 2]])),
+                           ("materials: whole", lambda: scene.add_mesh(*FLOOR, materials=[2**32, 0])),
+                           (r"positions: has the shape \(3, 4\)", lambda: scene.add_mesh(np.zeros((3, 4)), [[0, 1, 2]])),
+                           (r"transforms: has the shape \(4, 3, 1\)", lambda: scene.add_mesh(*FLOOR, transforms=np.zeros((4, 3, 1)))),
+                           ("positions: are of the type complex", lambda: scene.add_mesh(np.zeros((3, 3), complex), [[0, 1, 2]]))):
             with self.assertRaisesRegex(lumicut.Error, text):
                 call()
         with self.assertRaisesRegex(ValueError, "no direction"):

@@ -131,6 +131,18 @@ class Arguments(Cli):
         path.write_text(json.dumps({**scene, **changes}))
         return path
 
+    def test_no_output_takes_the_place_of_an_input(self):
+        scene, image, lights = self.scene("scene.json"), self.folder / "a.exr", self.folder / "a.vpl"
+        self.assert_ends(lumicut("render", scene, "--size", "8x8", "--vpls", "20", "-q", "-o", image, "--vpl-out", lights), OK)
+        (self.folder / "link.json").symlink_to(scene)
+        kept = {path: path.read_bytes() for path in (scene, image, lights)}
+        for words in (["render", scene, "-o", scene], ["render", self.folder / "link.json", "--stats", scene],
+                      ["render", scene, "--passes", "2", "--checkpoint", scene, "-o", self.folder / "b.exr"], ["render", scene, "--vpl-in", lights, "-o", lights],
+                      ["compare", image, image, "--error-image", image], ["mix", image, "-o", image]):
+            with self.subTest(words):
+                self.assert_ends(lumicut(*words), BAD_FILE, "is read")
+        self.assertEqual({path: path.read_bytes() for path in kept}, kept)
+
     def test_values_of_files_are_refused_in_the_files_terms(self):
         lamp = {"type": "point", "position": [0, 2, 2], "value": 10}
         for changes, says in (

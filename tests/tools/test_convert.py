@@ -127,7 +127,8 @@ class Convert(cli.Cli):
         self.assert_ends(lumicut("convert", gltf_scene(self.folder / "a.gltf"), out), OK)
         before = {p: p.read_bytes() for p in [out, *(self.folder / "out_files").iterdir()]}
         self.assert_ends(lumicut("convert", self.write("bad.ply", "ply\n"), out), BAD_FILE, "bad.ply")
-        self.assert_ends(lumicut("convert", out, out), BAD_FILE, "out.json")
+        self.assert_ends(lumicut("convert", out, out), BAD_FILE, "out.json", "is read")
+        self.assert_ends(lumicut("convert", self.folder / "a.gltf", f"{self.folder}/\udcff.json"), BAD_FILE, "UTF-8")
         self.assert_ends(lumicut("convert", self.folder / "a.gltf", self.folder / "out.txt"), USAGE, ".json")
         self.assert_ends(lumicut("convert", self.folder / "a.gltf", self.folder / "none/out.json"), BAD_FILE, "none")
         # No room for the meshes of a bigger one.

@@ -149,6 +149,27 @@ class Progressive(Compared):
         self.assertGreaterEqual(values["passes"], 8)
         self.assertLessEqual(values["error"], 0.6)
 
+    def test_the_costliest_program_is_cancelled_at_once(self):
+        # A hit takes some milliseconds and a pixel minutes, so that a cancel that waits for a pixel's end comes too late.
+        steps = [{"op": "position"}] + [{"op": "voronoi", "mode": 11, "inputs": [0, [i], [1], [1], [1]]} for i in range(1000)]
+        for slot in ("diffuse_texture", "emission_texture", "opacity_texture"):
+            scene = {"camera": {"eye": [0.5, 0.5, 3], "at": [0.5, 0.5, 0], "fov_y": 20},
+                     "materials": [{"name": "m", "diffuse": [0.5, 0.5, 0.5], "emission": [1, 1, 1], slot: {"program": "p"}}],
+                     "meshes": [{"positions": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "quads": [[0, 1, 2, 3]] * 500, "material": "m"}],
+                     "lights": [{"type": "point", "position": [0.5, 0.5, 2], "value": 5}], "programs": [{"name": "p", "steps": steps}]}
+            path = self.folder / "costly.json"
+            path.write_text(json.dumps(scene))
+            for integrator in ("path_tracer", "lightcuts"):
+                with self.subTest(slot=slot, integrator=integrator):
+                    process = subprocess.Popen([COMMAND, "render", path, "-i", integrator, "--spp", "65536", "--size", "64x64", "-q", "-o", self.folder / "a.exr"],
+                                               stderr=subprocess.DEVNULL)
+                    time.sleep(1)  # reading is over
+                    process.send_signal(signal.SIGTERM)
+                    try:
+                        self.assertEqual(process.wait(60), INTERRUPTED)
+                    finally:
+                        process.kill()
+
     def test_wrong_words_are_named(self):
         for arguments, text in ((["--confidence", "2"], "--confidence"), (["--resume"], "--checkpoint"),
                                 (["--squares", "2", "--passes", "2"], "--squares")):
@@ -181,7 +202,9 @@ class Presets(Compared):
 
     def test_wrong_ones_are_named(self):
         for arguments, text in ((["--preset", "best"], "draft, good, final, reference"), (["--preset", "good", "-i", "wspd"], "--integrator"),
-                                (["--preset", "good", "--squares", "2"], "--preset")):
+                                (["--preset", "good", "--squares", "2"], "--preset"),
+                                (["--preset", "good", "--vpl-out", self.folder / "a.vpl"], "importance"),
+                                (["-i", "path_tracer", "--vpl-out", self.folder / "a.vpl"], "no virtual lights")):
             self.assert_ends(lumicut("render", SCENE, "-o", self.folder / "a.exr", *arguments), USAGE, text)
         self.assertEqual(self.files(), [])
 

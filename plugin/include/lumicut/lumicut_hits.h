@@ -25,7 +25,7 @@ typedef struct lumicut_hits_extension {
   uint32_t reserved;
   /* [shared] Of a committed scene. The rays are those of pass `pass` of lumicut_render_start with `frame` and an integrator
      whose parameter seed is `seed`: frame->samples a pixel of the rectangle (NULL: the crop), pixel after pixel, rows packed
-     from the top, into `hits`. Of `frame` size, samples, crop, filter, and whether passes is 1 count. */
+     from the top, into `hits`. lumicut_cancel(scene) ends it: LUMICUT_CANCELLED, and `hits` holds nothing of use. Of `frame` size, samples, crop, filter, and whether passes is 1 count. */
   lumicut_result (*trace)(lumicut_scene scene, const lumicut_render_desc* frame, uint64_t seed, uint64_t pass,
                           const lumicut_tile* rect, lumicut_first_hit* hits);
 } lumicut_hits_extension;
