@@ -56,13 +56,41 @@ void check_exr_attributes(const std::string& path, const std::string& as, std::i
   }
 }
 
+// libpng takes and clears what a chunk's length asks for, up to 2 GB, before it looks for the bytes; pixels alone it reads
+// piece by piece. [https://www.w3.org/TR/png/#5Chunk-layout]
+void check_png_chunks(const std::string& path, const std::string& as, std::istream& file) {
+  char signature[8] = {};
+  if (!file.read(signature, sizeof(signature)) || std::string_view(signature, sizeof(signature)) != "\x89PNG\r\n\x1a\n")
+    return;
+  const auto after = file.tellg();
+  file.seekg(0, std::ios::end);
+  const auto length = static_cast<int64_t>(file.tellg());
+  file.seekg(after);
+  for (unsigned char head[8]; file.read(reinterpret_cast<char*>(head), sizeof(head));) {
+    const std::string_view type(reinterpret_cast<char*>(head) + 4, 4);
+    const int64_t size = int64_t{head[0]} << 24 | head[1] << 16 | head[2] << 8 | head[3],
+                  left = length - static_cast<int64_t>(file.tellg());
+    if (type == "IEND" || (type == "IDAT" && size > left)) return;  // libpng says what is cut short
+    if (size > left)
+      throw FileError(path, fmt::format("not readable as {}: the chunk at byte {} claims {} bytes of {}", as,
+                                        length - left - 8, size, left));
+    file.seekg(size + 4, std::ios::cur);  // a checksum ends it
+  }
+}
+
+void check_claims(const std::string& path, const std::string& as, std::istream& file) {
+  check_exr_attributes(path, as, file);
+  file.clear(), file.seekg(0);
+  check_png_chunks(path, as, file);
+}
+
 }  // namespace
 
 std::unique_ptr<OIIO::ImageInput> open_image(const std::string& path, const std::string& as,
                                              const OIIO::ImageSpec* wish) {
   check_regular_file(path);
   std::ifstream file(path, std::ios::binary);
-  check_exr_attributes(path, as, file);
+  check_claims(path, as, file);
   auto input = OIIO::ImageInput::open(path, wish);
   if (!input) throw FileError(path, fmt::format("not readable as {}: {}", as, OIIO::geterror()));
   return input;
@@ -70,10 +98,8 @@ std::unique_ptr<OIIO::ImageInput> open_image(const std::string& path, const std:
 
 std::unique_ptr<OIIO::ImageInput> open_held_image(const std::string& path, const std::string& as, std::string_view held,
                                                   OIIO::Filesystem::IOMemReader& memory) {
-  if (held.starts_with("\x76\x2f\x31\x01")) {
-    std::istringstream file{std::string(held)};
-    check_exr_attributes(path, as, file);
-  }
+  std::istringstream file{std::string(held)};
+  check_claims(path, as, file);
   // The ending says which format is tried first.
   auto input = OIIO::ImageInput::open(held.starts_with("\xff\xd8") ? "image.jpg" : "image.png", nullptr, &memory);
   if (!input) throw FileError(path, fmt::format("not readable as {}: {}", as, OIIO::geterror()));

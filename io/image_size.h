@@ -14,7 +14,7 @@ namespace lumicut::io {
 inline constexpr uint64_t kMaxImagePixels = uint64_t{1} << 28;
 
 // Opens an image; `as` is what it is wanted as ("an image"), `wish` what OpenImageIO shall do with it. Throws FileError when
-// it is no plain file, not readable, or an EXR whose header claims more bytes than follow.
+// it is no plain file, not readable, or an EXR or PNG whose header claims more bytes than follow.
 std::unique_ptr<OIIO::ImageInput> open_image(const std::string& path, const std::string& as,
                                              const OIIO::ImageSpec* wish = nullptr);
 

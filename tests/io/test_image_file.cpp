@@ -93,6 +93,23 @@ TEST(ImageFile, AnAttributeLongerThanItsFileIsRefusedBeforeMemoryIsTaken) {
   EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 100 << 10);  // kB; OpenEXR alone takes all of them
 }
 
+TEST(ImageFile, APngsChunkLongerThanItsFileIsRefusedBeforeMemoryIsTaken) {
+  const TemporaryFolder folder;
+  write_png(folder / "a.png", std::vector<uint8_t>(3 * 4 * 3, 128), 4, 3, 3);
+  std::string bytes = read_whole_file(folder / "a.png");
+  const size_t end = bytes.find("IEND");
+  ASSERT_NE(end, std::string::npos);
+  for (const size_t at : {size_t{33}, end - 4}) {  // after the header, and after the pixels
+    std::string longer = bytes;
+    longer.insert(at, std::string("\x71\0\0\0tEXt", 8));  // 1.9 GB
+    rusage before{}, after{};
+    getrusage(RUSAGE_SELF, &before);
+    expect_in(error_of([&] { read_image(folder.write("b.png", longer)); }), {"b.png", "claims 1895825408 bytes"});
+    getrusage(RUSAGE_SELF, &after);
+    EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 100 * 1024);
+  }
+}
+
 TEST(ImageFile, BytesTurnedOverNeverCrash) {
   const TemporaryFolder folder;
   write_exr(folder / "a.exr", example(), false);
