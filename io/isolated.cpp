@@ -11,10 +11,10 @@
 #include <cmath>
 #include <csignal>
 #include <cstring>
+#include <fstream>
 #include <new>
 
 #include "io/file_error.h"
-#include "io/physical_memory.h"
 
 namespace lumicut::io {
 
@@ -38,13 +38,21 @@ void limit(__rlimit_resource_t what, rlim_t most) {
   setrlimit(what, &now);
 }
 
-[[noreturn]] void child(int to, double seconds, const std::function<std::string()>& work) {
+// Of addresses, in bytes; 0 where /proc does not say.
+[[maybe_unused]] uint64_t taken() {
+  uint64_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  return pages * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
+[[noreturn]] void child(int to, double seconds, [[maybe_unused]] uint64_t bytes,
+                        const std::function<std::string()>& work) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   for (const int signal : {SIGINT, SIGTERM, SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL}) std::signal(signal, SIG_DFL);
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_CPU, static_cast<rlim_t>(std::ceil(seconds)));
 #ifndef LUMICUT_SANITIZED
-  limit(RLIMIT_AS, physical_memory());  // sanitizers reserve more
+  limit(RLIMIT_AS, taken() + bytes);  // sanitizers reserve more
 #endif
   // Libraries talk; their words are not this program's.
   if (const int nothing = open("/dev/null", O_WRONLY); nothing >= 0) dup2(nothing, 1), dup2(nothing, 2);
@@ -64,7 +72,7 @@ void limit(__rlimit_resource_t what, rlim_t most) {
 
 }  // namespace
 
-std::string isolated(const std::string& file, const std::string& reader, double seconds,
+std::string isolated(const std::string& file, const std::string& reader, double seconds, uint64_t bytes,
                      const std::function<std::string()>& work) {
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0) throw FileError(file, fmt::format("no pipe for its reader: {}", strerror(errno)));
@@ -76,7 +84,7 @@ std::string isolated(const std::string& file, const std::string& reader, double 
   }
   if (pid == 0) {
     close(ends[0]);
-    child(ends[1], seconds, work);
+    child(ends[1], seconds, bytes, work);
   }
   close(ends[1]);
   std::string answer;
@@ -99,7 +107,8 @@ std::string isolated(const std::string& file, const std::string& reader, double 
                     fmt::format("{} broke at it (signal {})", reader, WIFSIGNALED(status) ? WTERMSIG(status) : 0));
   const char end = answer.back();
   answer.pop_back();
-  if (end == kNoMemory) throw FileError(file, fmt::format("{} needs more memory for it than there is", reader));
+  if (end == kNoMemory)
+    throw FileError(file, fmt::format("{} needs more than {} MB of memory for it", reader, bytes >> 20));
   if (end == kRefused) throw FileError(answer);
   return answer;
 }

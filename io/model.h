@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstring>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -137,7 +138,8 @@ void pack(Archive& archive, T& model) {
 // What the module lib/lumicut/models.so gives. A class for the reason at ImageModule.
 class ModelModule {
  public:
-  virtual Model read(const std::string& path) const = 0;
+  // `bytes`: of a PLY that is in memory already; empty: the file is read.
+  virtual Model read(const std::string& path, std::string_view bytes) const = 0;
 
  protected:
   ~ModelModule() = default;

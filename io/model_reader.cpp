@@ -10,6 +10,7 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <new>
 #include <numbers>
 #include <optional>
 
@@ -37,8 +38,8 @@ Vec vec(const aiVector3D& v) { return {v.x, v.y, v.z}; }
 
 class Reader {
  public:
-  explicit Reader(const std::string& path) : path_(path) {
-    ending_ = lower(std::filesystem::path(path).extension().string());
+  Reader(const std::string& path, std::string_view bytes) : path_(path), bytes_(bytes) {
+    ending_ = bytes.empty() ? lower(std::filesystem::path(path).extension().string()) : ".ply";
   }
 
   Model read() {
@@ -47,10 +48,17 @@ class Reader {
     importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_READ_ANIMATIONS, false);
     importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_PRESERVE_PIVOTS, false);
     importer.SetPropertyInteger(AI_CONFIG_PP_FD_REMOVE, 1);
-    assimp_ = importer.ReadFile(path_, aiProcess_Triangulate | aiProcess_JoinIdenticalVertices | aiProcess_SortByPType |
-                                           aiProcess_ValidateDataStructure);
-    if (assimp_ == nullptr || assimp_->mRootNode == nullptr)
-      throw FileError(path_, one_line(importer.GetErrorString()));
+    constexpr unsigned kSteps = aiProcess_Triangulate | aiProcess_JoinIdenticalVertices | aiProcess_SortByPType |
+                                aiProcess_ValidateDataStructure;
+    assimp_ = bytes_.empty() ? importer.ReadFile(path_, kSteps)
+                             : importer.ReadFileFromMemory(bytes_.data(), bytes_.size(), kSteps, "ply");
+    if (assimp_ == nullptr || assimp_->mRootNode == nullptr) {
+      const std::string error = one_line(importer.GetErrorString());
+      if (error.find("bad_alloc") != error.npos || error.find("std::vector") != error.npos ||
+          error.find("vector::") != error.npos)
+        throw std::bad_alloc();  // what assimp made of it
+      throw FileError(path_, error);
+    }
     for (unsigned i = 0; i < assimp_->mNumMaterials; ++i) read_material(*assimp_->mMaterials[i], i);
     if (ending_ == ".ply")  // which knows none: what there is is assimp's
       for (Material& material : model_.scene.materials) material.values = default_material();
@@ -334,6 +342,7 @@ class Reader {
   }
 
   std::string path_, ending_;
+  std::string_view bytes_;
   const aiScene* assimp_ = nullptr;
   Model model_;
   size_t nodes_ = 0;
@@ -342,7 +351,7 @@ class Reader {
 
 class Module final : public ModelModule {
  public:
-  Model read(const std::string& path) const override { return Reader(path).read(); }
+  Model read(const std::string& path, std::string_view bytes) const override { return Reader(path, bytes).read(); }
 };
 
 const Module kModule;

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <set>
 
 #include "io/file_error.h"
@@ -13,11 +12,12 @@
 #include "io/isolated.h"
 #include "io/model.h"
 #include "io/module.h"
+#include "io/physical_memory.h"
+#include "io/ply_check.h"
 #include "io/scene_defaults.h"
 #include "io/scene_obj.h"
 #include "io/text_lines.h"
 #include "io/texture_store.h"
-#include "io/unpack_folder.h"
 #include "io/vertex_colours.h"
 
 namespace lumicut::io {
@@ -27,13 +27,11 @@ namespace fs = std::filesystem;
 namespace {
 
 // Of the processor, for one file: hundreds of times what is usual.
-double seconds_for(const std::string& path) {
+double seconds_for(uint64_t bytes) {
 #ifdef LUMICUT_SANITIZED
-  return 1;  // libFuzzer waits ten by the clock
+  return 1 + 0 * static_cast<double>(bytes);  // libFuzzer waits ten by the clock
 #endif
-  std::error_code code;
-  const auto bytes = fs::file_size(path, code);
-  return 2 + (code ? 0 : 60 * static_cast<double>(bytes) / (1 << 20));
+  return 2 + 60 * static_cast<double>(bytes) / (1 << 20);
 }
 
 std::string ending_of(const std::string& path) { return lower(fs::path(path).extension().string()); }
@@ -65,12 +63,22 @@ std::vector<int32_t> read_textures(const Model& model, const std::string& path, 
   return numbers;
 }
 
-Model read_by_assimp(const std::string& path) {
+// The same of memory: assimp takes some tens of bytes for one of the file.
+uint64_t memory_for(uint64_t bytes) { return std::min(physical_memory(), (uint64_t{1} << 30) + 200 * bytes); }
+
+// `held`: the bytes of a PLY that was packed.
+Model read_by_assimp(const std::string& path, const std::string& held = {}) {
   check_regular_file(path);
-  const std::string reader = fmt::format("the reader of {} files", ending_of(path).substr(1));
-  const std::string bytes = isolated(path, reader, seconds_for(path), [&] {
+  const bool ply = !held.empty() || ending_of(path) == ".ply";
+  const std::string reader = fmt::format("the reader of {} files", ply ? "ply" : ending_of(path).substr(1));
+  std::error_code code;
+  const auto stored = fs::file_size(path, code);
+  const uint64_t size = std::max<uint64_t>(held.size(), code ? 0 : stored);
+  const std::string bytes = isolated(path, reader, seconds_for(size), memory_for(size), [&] {
     Packer packer;
-    const Model model = load_module<ModelModule>(path, "models", "lumicut_model_module")->read(path);
+    const std::string file = ply && held.empty() ? read_whole_file(path) : held;
+    if (ply) check_ply(path, file);
+    const Model model = load_module<ModelModule>(path, "models", "lumicut_model_module")->read(path, file);
     pack(packer, model);
     return packer.take();
   });
@@ -125,20 +133,9 @@ std::vector<Mesh> read_model_meshes(const std::string& path, Warnings& warnings)
   if (ending_of(path) == ".gz") {
     constexpr uint64_t kMost = uint64_t{4} << 30;
     check_regular_file(path);
-    const UnpackFolder folder;
-    const std::string file = (folder.path() / fs::path(path).stem().filename()).string();
-    std::ofstream out(file, std::ios::binary);
     const std::string bytes = unpacked(read_whole_file(path, kMost), kMost, path);
-    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    out.close();
-    if (!out) throw FileError(file, "cannot be written");
-    try {
-      return read_model_meshes(file, warnings);
-    } catch (const FileError& error) {
-      std::string text = error.what();
-      if (const size_t at = text.find(file); at != std::string::npos) text.replace(at, file.size(), path);
-      throw FileError(text);
-    }
+    if (bytes.empty()) throw FileError(path, "is empty");
+    return read_by_assimp(path, bytes).scene.meshes;
   }
   if (ending_of(path) == ".obj") {
     std::vector<Texture> none;

@@ -20,7 +20,9 @@ using nlohmann::ordered_json;
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr uint64_t kMostTriangles = uint64_t{1} << 25;
+// Rays are traced among the triangles of all instances, 150 bytes each: up to so many in all, and beyond the smaller number no
+// more than twice what the scene stores.
+constexpr uint64_t kMostTriangles = uint64_t{1} << 25, kMostOfInstances = uint64_t{1} << 21;
 constexpr const char* kLightTypes[] = {"point", "spot", "rectangle", "disk", "sun"};
 
 double luminance(const float (&c)[3]) { return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]; }
@@ -175,7 +177,7 @@ class Examiner {
     meshes();
     materials();
     scale();
-    if (world_triangles_ <= kMostTriangles) see();
+    if (world_triangles_ <= std::min(kMostTriangles, std::max(kMostOfInstances, 2 * scene_.triangle_count()))) see();
     for (const auto& [key, tally] : tallies_) say(tally.kind, tally.text(tally.count));
     return std::move(p_);
   }

@@ -3,6 +3,7 @@ import json
 import math
 import os
 import struct
+import subprocess
 import unittest
 import zlib
 
@@ -10,7 +11,7 @@ import numpy as np
 
 import test_gltf
 import test_models
-from cli import BAD_FILE, OK, lumicut
+from cli import BAD_FILE, COMMAND, OK, lumicut
 from test_pbrt import SceneFiles
 
 
@@ -292,6 +293,17 @@ class Mitsuba(SceneFiles):
             with self.subTest(part[:60]):
                 self.assert_ends(lumicut("render", self.write("bad.xml", scene(FLOOR, part)), "-o", self.folder / "x.exr"), BAD_FILE, *texts)
         self.assert_ends(lumicut("render", self.write("odd.xml", "<html/>"), "-o", self.folder / "x.exr"), BAD_FILE, "odd.xml", "<scene>")
+
+    def test_two_thousand_equal_spheres_are_one_mesh(self):
+        path = self.folder / "many.xml"
+        path.write_text('<scene version="3.0.0">' + '<shape type="sphere"/>' * 2000 + "</scene>")
+        # The memory of the process and of its threads' stacks, not of 18 million triangles.
+        done = subprocess.run(["bash", "-c", f"ulimit -v 2000000; exec {COMMAND} check --no-forecast --threads 1 --json {path}"],
+                              capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, OK, done.stderr)
+        counts = json.loads(done.stdout)["counts"]
+        self.assertEqual((counts["meshes"], counts["instances"]), (1, 2000))
+        self.assertLess(counts["triangles"], 10000)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,8 @@ import json
 import math
 import os
 import pathlib
+import resource
+import struct
 import subprocess
 import unittest
 
@@ -195,9 +197,41 @@ class Models(cli.Cli):
         os.mkfifo(self.folder / "pipe.fbx")
         self.assert_ends(lumicut("render", self.folder / "pipe.fbx", "-o", self.folder / "x.exr"), BAD_FILE, "pipe.fbx")
 
-    def test_a_file_in_which_assimp_reads_for_ever_ends_in_an_error(self):
+    def test_a_ply_in_which_assimp_would_read_for_ever_is_refused(self):
         (self.folder / "endless.ply").write_bytes((ROOT / "tests/fuzz/corpus/model/endless_ply").read_bytes()[1:])
-        self.assert_ends(lumicut("render", self.folder / "endless.ply", "-o", self.folder / "x.exr"), BAD_FILE, "endless.ply", "2 s of the processor")
+        self.assert_ends(lumicut("render", self.folder / "endless.ply", "-o", self.folder / "x.exr"), BAD_FILE, "endless.ply", "no end_header")
+
+    def test_counts_of_a_ply_that_its_file_cannot_hold_are_named(self):
+        def ply_of(kind="ascii", vertices=3, count="uchar", face=b"3 0 1 2\n"):
+            return (f"ply\nformat {kind} 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n"
+                    f"element face 1\nproperty list {count} int vertex_indices\nend_header\n").encode() + (
+                        b"0 0 0\n1 0 0\n0 1 0\n" if kind == "ascii" else struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0)) + face
+        binary = "binary_little_endian"
+        path = self.folder / "a.ply"
+        for good in (ply_of(), ply_of(binary, face=struct.pack("<B3i", 3, 0, 1, 2))):
+            path.write_bytes(good)
+            self.assert_ends(lumicut("convert", path, self.folder / "x.json"), OK)
+        for bad, *texts in ((ply_of(vertices=4000000000), "element vertex promises 4000000000 rows", "bytes"),
+                            (ply_of(binary, vertices=4000000000), "element vertex promises 4000000000 rows"),
+                            (ply_of(vertices=-3), "element vertex promises -3 rows"),
+                            (ply_of(face=b"255 0 1 2\n"), "row 0", "\"face\"", "a list of 255"),
+                            (ply_of(face=b""), "after 0 of the 1 rows", "\"face\""),
+                            (ply_of(binary, vertices=30, face=b""), "of the 30 rows", "\"vertex\""),
+                            (ply_of(binary, count="uint", face=struct.pack("<I3i", 4000000000, 0, 1, 2)), "row 0", "4000000000"),
+                            (ply_of(binary, count="int", face=struct.pack("<i3i", -3, 0, 1, 2)), "row 0", "below 0")):
+            path.write_bytes(bad)
+            self.assert_ends(lumicut("convert", path, self.folder / "x.json"), BAD_FILE, "a.ply", *texts)
+
+    def test_small_files_that_grow_in_assimp_end_by_their_memory(self):
+        # Nodes of COLLADA that stand for two others each: 2^40 in the end.
+        nodes = "".join(f'<node id="a{i}">' + f'<instance_node url="#a{i + 1}"/>' * 2 + "</node>" for i in range(40)) + '<node id="a40"/>'
+        path = self.write("grown.dae", '<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">'
+                          '<asset><unit meter="1"/><up_axis>Y_UP</up_axis></asset><library_nodes>' + nodes + "</library_nodes><library_visual_scenes>"
+                          '<visual_scene id="s"><node id="n"><instance_node url="#a0"/></node></visual_scene></library_visual_scenes>'
+                          '<scene><instance_visual_scene url="#s"/></scene></COLLADA>')
+        self.assert_ends(lumicut("convert", path, self.folder / "x.json"), BAD_FILE, "grown.dae", "the reader of dae files")
+        children = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+        self.assertLess(children, 1400)  # MB: one GiB, and what a process of the command has
 
     def test_colours_of_vertices_of_a_ply_are_its_colour(self):
         text = ply(FLOOR).replace("property float z\n", "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n")
