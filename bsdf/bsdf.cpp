@@ -38,6 +38,7 @@ Bsdf::Bsdf(const BsdfParameters& parameters, const SurfaceView& view)
   p.normal = normal_;
   p.pixel = view.pixel;
   p.smooth = behind_ ? -view.smooth : view.smooth;
+  p.not_lit_by = view.not_lit_by;
   if (parameters.model != LobeModel::ggx) {
     p.mirror = normalize(reflect(to_viewer_, p.normal));
     p.diffuse = parameters.diffuse * kInvPi;
@@ -65,6 +66,7 @@ Bsdf::Bsdf(const BsdfParameters& parameters, const SurfaceView& view)
     if (!smooth_coat(parameters.coat, parameters.coat_alpha)) {
       SurfacePoint& above = layers_[layer_count_++];
       above.position = p.position, above.normal = p.normal, above.mirror = p.mirror, above.pixel = p.pixel;
+      above.not_lit_by = p.not_lit_by;
       above.lobe = kLobe<GgxReflection>, above.shape = coat.alpha, above.ior = coat.ior;
       above.specular = Rgb{1, 1, 1} * coat.f0, above.grazing = Rgb{1, 1, 1} * coat.f90;
     }
@@ -79,7 +81,7 @@ void Bsdf::add_other_side() {
   other.position = origin(kTransmitted);
   other.normal = other.mirror = -normal_;
   other.diffuse = parameters_.translucency * kInvPi;
-  other.pixel = layers_[0].pixel;
+  other.pixel = layers_[0].pixel, other.not_lit_by = layers_[0].not_lit_by;
   other.smooth = -layers_[0].smooth;
 }
 
@@ -226,7 +228,8 @@ std::optional<ScatterSample> Bsdf::scatter(Rng& rng) const {
   const auto s = PointBsdf(layers_[layer]).sample(lobe, u, v);
   const uint32_t side = side_of(layer);
   if (!s || (side == kTransmitted) != (dot(s->direction, side_) < 0.0f)) return {};
-  return ScatterSample{s->direction, s->weight, 1.0f / ((survive - p_specular) * shares[layer]), side};
+  return ScatterSample{s->direction, s->weight, 1.0f / ((survive - p_specular) * shares[layer]),
+                       side | (s->flags & kGlossy)};
 }
 
 // Blinn's and Phong's surfaces, by the largest of kd and ks.
@@ -244,6 +247,7 @@ std::optional<ScatterSample> Bsdf::scatter_cosine(Rng& rng) const {
     s.weight = kd, s.factor = 1.0f / p_diffuse;
   } else {
     const float n = parameters_.exponent;
+    s.flags |= kGlossy;
     s.direction = CosineLobe::sample(layers_[0], u, v);
     // lobe·cosθ / pdf, with pdf = (n+1)/2π cosⁿβ
     const float scale =

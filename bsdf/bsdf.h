@@ -21,7 +21,8 @@ struct SurfaceView {
   Vec3f position, geometric_normal, normal, to_viewer;
   float offset;  // of ray origins from the surface
   uint32_t pixel = 0;
-  Vec3f smooth{};  // unit shading normal before textures bent it, where that dims (bsdf/bump_shadow.h); else 0
+  Vec3f smooth{};           // unit shading normal before textures bent it, where that dims (bsdf/bump_shadow.h); else 0
+  uint32_t not_lit_by = 0;  // of its mesh
 };
 
 // The continuation of a light path: its flux is multiplied by weight · factor (which holds the chance of the roulette).
@@ -52,6 +53,8 @@ class Bsdf {
   // What virtual lights shade, from beneath to above, and last the other side of what lets light through evenly: one
   // point, or up to three.
   std::span<const SurfacePoint> layers() const { return {layers_.data(), layer_count_}; }
+  // Sets of receivers that its mesh is not in.
+  uint32_t not_lit_by() const { return layers_[0].not_lit_by; }
   // Whether there is a lobe that rays must follow.
   bool is_specular() const { return specular_; }
   // The shading normal on the viewer's side.
@@ -65,6 +68,10 @@ class Bsdf {
   float pdf(const Vec3f& direction) const;
   // Base colour and F0 together, at most 1: what an albedo pass shows.
   Rgb albedo() const { return min(diffuse_color_ + specular_color_ + parameters_.translucency, Rgb{1, 1, 1}); }
+  // Of one kind of lobes: what leaves evenly, what is reflected otherwise, what goes through glass.
+  Rgb even_color() const { return diffuse_color_ + parameters_.translucency; }
+  Rgb reflected_color() const { return specular_color_; }
+  Rgb passed_color() const { return parameters_.model == LobeModel::ggx ? colors_.base * colors_.clear : Rgb{}; }
   // Intensity of the virtual light that stands for what is reflected evenly of this flux: Lambertian, of the same power.
   Rgb lambertian_intensity(const Rgb& flux) const;
   // The same for what leaves on the other side; 0 where nothing does.

@@ -11,7 +11,7 @@ void for_each_array(Points& p, Fn fn) {
   for (int k = 0; k < 3; ++k)
     fn(p.position[k]), fn(p.normal[k]), fn(p.mirror[k]), fn(p.diffuse[k]), fn(p.specular[k]), fn(p.grazing[k]),
         fn(p.smooth[k]);
-  fn(p.shape), fn(p.ior), fn(p.falloff), fn(p.retro), fn(p.dim), fn(p.lobe), fn(p.pixel);
+  fn(p.shape), fn(p.ior), fn(p.falloff), fn(p.retro), fn(p.dim), fn(p.lobe), fn(p.pixel), fn(p.not_lit_by);
 }
 }  // namespace
 
@@ -39,7 +39,7 @@ void ShadePoints::push(const SurfacePoint& p) {
   }
   shape.push_back(p.shape), ior.push_back(p.ior);
   falloff.push_back(p.falloff), retro.push_back(p.retro), dim.push_back(p.dim);
-  lobe.push_back(p.lobe), pixel.push_back(p.pixel);
+  lobe.push_back(p.lobe), pixel.push_back(p.pixel), not_lit_by.push_back(p.not_lit_by);
   lobes_ = std::max(lobes_, p.lobes());
   bent_ |= p.bent();
   ++size_;
@@ -53,8 +53,8 @@ void ShadePoints::finish() {
 
 SurfacePoint ShadePoints::get(size_t i) const {
   const auto at = [i](const std::vector<float>(&a)[3]) { return Vec3f{a[0][i], a[1][i], a[2][i]}; };
-  return {at(position), at(normal), at(mirror), at(diffuse), at(specular), at(grazing), shape[i],
-          ior[i],       lobe[i],    falloff[i], retro[i],    dim[i],       pixel[i],    at(smooth)};
+  return {at(position), at(normal), at(mirror), at(diffuse), at(specular), at(grazing), shape[i],     ior[i],
+          lobe[i],      falloff[i], retro[i],   dim[i],      pixel[i],     at(smooth),  not_lit_by[i]};
 }
 
 }  // namespace lumicut

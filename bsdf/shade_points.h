@@ -31,7 +31,8 @@ struct SurfacePoint {
   float falloff = 0.0f;            // of the diffuse part towards grazing light (bsdf/lambert.h)
   float retro = 0.0f, dim = 0.0f;  // of the diffuse part, as Burley's is (bsdf/burley.h)
   uint32_t pixel = 0;              // points of one pixel lie together
-  Vec3f smooth{};  // unit: before textures bent the normal, where that dims (bsdf/bump_shadow.h); else 0
+  Vec3f smooth{};           // unit: before textures bent the normal, where that dims (bsdf/bump_shadow.h); else 0
+  uint32_t not_lit_by = 0;  // sets of receivers that its mesh is not in (scene/ray_kind.h)
 
   bool burley() const { return retro > 0.0f || dim > 0.0f; }
   bool bent() const { return smooth != Vec3f{}; }
@@ -47,7 +48,7 @@ struct ShadePoints {
   // position, normal, mirror, diffuse, specular, grazing, smooth: [component][point]
   std::vector<float> position[3], normal[3], mirror[3], diffuse[3], specular[3], grazing[3], smooth[3], shape, ior,
       falloff, retro, dim;
-  std::vector<uint32_t> lobe, pixel;
+  std::vector<uint32_t> lobe, pixel, not_lit_by;
 
   size_t size() const { return size_; }
   // Of any of the points: kernels skip what none has.

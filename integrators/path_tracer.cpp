@@ -7,6 +7,7 @@
 #include "core/parallel.h"
 #include "core/sampling.h"
 #include "integrators/integrator.h"
+#include "lights/light_reach.h"
 #include "lights/light_sampler.h"
 #include "lights/light_surfaces.h"
 #include "scene/rng_at_point.h"
@@ -80,6 +81,7 @@ class PathTracer final : public Integrator {
     float travelled = 0.0f;       // on that way, since `point`
     uint32_t kind = kDiffuseRay;  // of its ray
     Rgb absorption{};             // on its way, for each unit of length
+    uint32_t not_lit_by = 0;      // specular: sets of receivers that the surface it left is not in
   };
   struct Shadow {
     Rgb light;
@@ -138,12 +140,12 @@ class PathTracer final : public Integrator {
       const Vpl& light = sampler_->delta_lights()[i];
       add_shadow(path, light, 0.0f,
                  light_point(light, light.intensity / static_cast<float>(delta_.pmf(i)), Falloff(scene_->profiles()),
-                             path.point),
+                             limited(path.point, light)),
                  rays, shadows);
     }
     if (!sampler_->has_extended() && !sampler_->has_environment()) return;
     const DirectSample s = sampler_->sample_light(path.rng);
-    Rgb light = light_point(s.vpl, s.vpl.intensity, Falloff(scene_->profiles()), path.point);
+    Rgb light = light_point(s.vpl, s.vpl.intensity, Falloff(scene_->profiles()), limited(path.point, s.vpl));
     if (!(max_component(light) > 0.0f)) return;
     if (s.seen_by_rays) {
       const bool far = s.vpl.kind == VplKind::directional;
@@ -178,11 +180,16 @@ class PathTracer final : public Integrator {
     Rgb& sum = radiance[path.index];
     if (!light_surfaces_->empty())
       light_surfaces_->for_each_hit(hit.ray.org, path.direction, hit.ray.tfar, [&](const LightSurfaces::Hit& seen) {
+        const LightReach& reach = scene_->lights()[seen.light].reach;
+        const bool shown = reach.lights(path.kind) && in_set(path.not_lit_by, reach.receivers);
+        if (path.specular ? !shown : !seen.by_rays) return;
         const double distance = double{path.travelled} + seen.t;
         const double density = sampler_->light_density(seen.light) * distance * distance / seen.cosine;
         sum += path.weight * seen.radiance * (path.specular ? 1.0f : power_heuristic(path.pdf, density));
       });
     if (hit.hit.geom == kNoId) {
+      const LightReach& reach = scene_->environment().reach;
+      if (path.specular ? !reach.lights(path.kind) : reach.limited()) return false;
       const Rgb light = scene_->environment_radiance(path.direction);
       if (max_component(light) > 0.0f)
         sum += path.weight * light *
@@ -216,6 +223,7 @@ class PathTracer final : public Integrator {
     if (choice.specular) {
       path.origin = at.bsdf.origin(choice.specular->flags), path.direction = choice.specular->direction;
       path.kind = ray_kind(choice.specular->flags, path.kind);
+      if (!path.straight) path.not_lit_by = at.bsdf.not_lit_by();
       path.absorption = at.bsdf.absorption_after(choice.specular->flags, path.absorption);
       path.weight = path.weight * choice.specular->weight / choice.probability;
       return survives(path, depth, path.weight, path.weight);

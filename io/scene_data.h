@@ -30,6 +30,8 @@ struct Texture {
 };
 
 // Names of the bits of a mesh's mask, from LUMICUT_CAMERA_RAYS on.
+// Sets of light linking that there may be. [lumicut.h]
+inline constexpr uint32_t kReceiverSets = 32, kBlockerSets = 27;
 inline constexpr const char* kRayKinds[] = {"camera", "diffuse", "glossy", "transmission", "shadow"};
 
 // What programs ask of a mesh, as lumicut_attribute has it.
@@ -50,7 +52,8 @@ struct Mesh {
   std::vector<uint32_t> materials;  // one a triangle, index into SceneData::materials
   std::vector<float> transforms;    // twelve an instance; empty: one, as it is
   uint32_t group = 0;
-  uint32_t mask = 0;  // as in lumicut_mesh
+  uint32_t mask = 0;  // as in lumicut_mesh, and so
+  uint32_t not_lit_by = 0, not_blocking = 0, receivers = 0, blockers = 0;
   std::vector<Attribute> attributes;
 };
 

@@ -484,6 +484,10 @@ class SceneReader {
       kept = read_transforms(*transforms);
     }
     const uint32_t light_group = group(object), mask = ray_mask(object);
+    const uint32_t not_lit_by = sets(object, "not_lit_by", kReceiverSets),
+                   not_blocking = sets(object, "not_blocking", kBlockerSets),
+                   receivers = set_of(object, "receivers", kReceiverSets),
+                   blockers = set_of(object, "blockers", kBlockerSets);
     const auto attributes = object.find("attributes");
     const size_t first = scene_.meshes.size();
     if (object.has("obj")) {
@@ -506,6 +510,8 @@ class SceneReader {
       mesh.name = name.empty() ? value.path() : name;
       mesh.group = light_group;
       mesh.mask = mask;
+      mesh.not_lit_by = not_lit_by, mesh.not_blocking = not_blocking;
+      mesh.receivers = receivers, mesh.blockers = blockers;
       mesh.transforms = kept;
       place(value, mesh, placed);
     }
@@ -522,6 +528,18 @@ class SceneReader {
       for (const size_t k : {3u, 7u, 11u}) out[t + k] = checked(value, double{m[k]} * scale_);
     }
     return out;
+  }
+
+  // Light linking: the number of a set, or a bit for each of several.
+  static uint32_t set_of(JsonObject& object, const char* key, uint32_t most) {
+    const auto set = object.find(key);
+    return set ? static_cast<uint32_t>(set->integer(1, most)) : 0;
+  }
+  static uint32_t sets(JsonObject& object, const char* key, uint32_t most) {
+    uint32_t bits = 0;
+    if (const auto list = object.find(key))
+      for (const auto& set : list->elements()) bits |= uint32_t{1} << (set.integer(1, most) - 1);
+    return bits;
   }
 
   // Of a mesh that some kinds of rays do not see. 0: all do.
@@ -742,6 +760,7 @@ class SceneReader {
     store(light.color, object.vector3("color", {1, 1, 1}, 0, 1e15));
     light.value = static_cast<float>(object.need("value").number(0, 1e20));
     if (!object.boolean("shadows", true)) light.flags |= LUMICUT_NO_SHADOWS;
+    read_reach(object, light);
     if (light.type == LUMICUT_SUN) {
       store(light.direction, direction(object.need("direction")));
       light.radius = static_cast<float>(radians(object.number("angular_radius", 0, 0, 90)));
@@ -763,6 +782,17 @@ class SceneReader {
     }
     object.finish();
     add_light(value, light);
+  }
+
+  static void read_reach(JsonObject& object, lumicut_light& light) {
+    if (auto hidden = object.find("hidden_from")) {
+      if (object.boolean("visible", false)) hidden->fail("is not for a visible light, which is a mesh");
+      light.mask = ray_mask(object) & (LUMICUT_CAMERA_RAYS | LUMICUT_DIFFUSE_RAYS | LUMICUT_GLOSSY_RAYS |
+                                       LUMICUT_TRANSMISSION_RAYS | LUMICUT_SHADOW_RAYS);
+      if (light.mask == 0) hidden->fail("names every kind of ray: leave the light out");
+    }
+    light.receivers = set_of(object, "receivers", kReceiverSets);
+    light.blockers = set_of(object, "blockers", kBlockerSets);
   }
 
   // A point light with the file's intensities; a spot cuts its cone out of them.
@@ -872,6 +902,11 @@ class SceneReader {
     const bool visible = object.boolean("visible", false);
     if (visible && spread && light.spread < static_cast<float>(kPi) - 1e-6f)
       spread->fail("a visible light is Lambertian: leave \"spread\" out");
+    if (auto image = object.find("texture")) {
+      if (visible) image->fail("is not for a visible light, which is a mesh");
+      light.texture = textures_.get(resolve(*image), TextureUse::radiance, LUMICUT_CLAMP,
+                                    fmt::format("{} ({})", image->path(), path_));
+    }
     object.finish();
     if (visible) {
       add_visible_light(object, light, centre, u, v);
@@ -945,6 +980,12 @@ class SceneReader {
                      [](double x) { return static_cast<float>(x); });
     }
     if (auto hidden = object.find("hidden"); hidden && hidden->boolean()) environment.flags |= LUMICUT_HIDDEN;
+    if (object.has("hidden_from")) {
+      const uint32_t mask = ray_mask(object),
+                     all = LUMICUT_DIFFUSE_RAYS | LUMICUT_GLOSSY_RAYS | LUMICUT_TRANSMISSION_RAYS;
+      if ((mask & LUMICUT_CAMERA_RAYS) == 0) environment.flags |= LUMICUT_HIDDEN;
+      if ((mask & all) != all) environment.mask = (mask & all) | LUMICUT_CAMERA_RAYS;
+    }
     object.finish();
     scene_.environment = environment;
   }

@@ -75,6 +75,8 @@ void upload(const Api& api, lumicut_scene scene, const SceneData& data) {
     m.transform_count = mesh.transforms.size() / 12;
     m.group = mesh.group;
     m.mask = mesh.mask;
+    m.not_lit_by = mesh.not_lit_by, m.not_blocking = mesh.not_blocking;
+    m.receivers = mesh.receivers, m.blockers = mesh.blockers;
     std::vector<lumicut_attribute> attributes;
     for (const Attribute& from : mesh.attributes) {
       lumicut_attribute a{};

@@ -193,12 +193,15 @@ class Writer {
     }
     if (!mesh.transforms.empty()) out["transforms"] = block(mesh.transforms, 12);
     if (mesh.group != 0) out["group"] = mesh.group;
-    if (mesh.mask != 0) {
-      Json hidden = Json::array();
-      for (size_t k = 0; k < std::size(kRayKinds); ++k)
-        if ((mesh.mask & (1u << k)) == 0) hidden.push_back(kRayKinds[k]);
-      if (!hidden.empty()) out["hidden_from"] = hidden;
-    }
+    if (mesh.mask != 0)
+      if (Json hidden = hidden_from(mesh.mask); !hidden.empty()) out["hidden_from"] = hidden;
+    const auto sets = [&](const char* key, uint32_t bits) {
+      for (uint32_t n = 0; n < 32; ++n)
+        if ((bits >> n & 1) != 0) out[key].push_back(n + 1);
+    };
+    sets("not_lit_by", mesh.not_lit_by), sets("not_blocking", mesh.not_blocking);
+    if (mesh.receivers != 0) out["receivers"] = mesh.receivers;
+    if (mesh.blockers != 0) out["blockers"] = mesh.blockers;
     for (const Attribute& a : mesh.attributes) {
       constexpr const char* kDomains[] = {"vertices", "triangles", "instances"};
       Json attribute{{"name", attribute_name(a.id)}, {"domain", kDomains[a.domain]}, {"components", a.components}};
@@ -209,6 +212,13 @@ class Writer {
     return out;
   }
   static std::string attribute_name(uint32_t id) { return fmt::format("attribute {}", id); }
+
+  static Json hidden_from(uint32_t mask) {
+    Json hidden = Json::array();
+    for (size_t k = 0; k < std::size(kRayKinds); ++k)
+      if ((mask & (1u << k)) == 0) hidden.push_back(kRayKinds[k]);
+    return hidden;
+  }
 
   // ---- Textures and materials
 
@@ -357,12 +367,15 @@ class Writer {
     return out;
   }
 
-  Json light(const lumicut_light& l) const {
+  Json light(const lumicut_light& l) {
     constexpr const char* kTypes[] = {"point", "spot", "rectangle", "disk", "sun"};
     Json out{{"type", kTypes[l.type]}, {"value", double{l.value}}, {"color", numbers(l.color, 3)}};
     if (l.unit == LUMICUT_WATT) out["unit"] = "watt";
     if (l.group != 0) out["group"] = l.group;
     if ((l.flags & LUMICUT_NO_SHADOWS) != 0) out["shadows"] = false;
+    if (l.mask != 0) out["hidden_from"] = hidden_from(l.mask | LUMICUT_SHADOW_RAYS);
+    if (l.receivers != 0) out["receivers"] = l.receivers;
+    if (l.blockers != 0) out["blockers"] = l.blockers;
     if (l.type == LUMICUT_SUN) {
       out["direction"] = direction(l.direction);
       if (l.radius != 0) out["angular_radius"] = degrees(l.radius);
@@ -372,6 +385,7 @@ class Writer {
     if (l.type == LUMICUT_RECTANGLE || l.type == LUMICUT_DISK) {
       out["u"] = numbers(l.u, 3), out["v"] = numbers(l.v, 3);
       if (l.spread != 0) out["spread"] = degrees(l.spread);
+      if (l.texture > 0) out["texture"] = image_file(scene_.textures.at(static_cast<size_t>(l.texture) - 1));
       return out;
     }
     if (l.radius != 0) out["radius"] = double{l.radius};
@@ -403,6 +417,7 @@ class Writer {
       out["world_to_map"] = numbers(e.world_to_map, 9);
     if (e.group != 0) out["group"] = e.group;
     if ((e.flags & LUMICUT_HIDDEN) != 0) out["hidden"] = true;
+    if (e.mask != 0) out["hidden_from"] = hidden_from(e.mask | LUMICUT_SHADOW_RAYS | LUMICUT_CAMERA_RAYS);
     return out;
   }
 

@@ -95,18 +95,19 @@ Vpl LightSampler::place_on(size_t i, const EmitterShape& s, const Vec3f& at, con
     if (scene_.materials()[surface.material].cutout())
       radiance *= scene_.opacity(e.index, e.triangle, hit.hit.u, hit.hit.v, e.instance);
     v.intensity = radiance * area, v.group = scene_.meshes()[e.index].group;
+    set_reach(v, scene_.meshes()[e.index]);
     offset = surface.offset;
     return v;
   }
   const Light& l = scene_.lights()[e.index];
-  v.group = l.group, v.ray_mask = shadow_mask(l);
+  v.group = l.group, set_reach(v, l);
   offset = 0.0f;  // lights block nothing
   if (e.kind == Kind::sphere) {
     v.normal = normalize(at - l.position);
     v.intensity = l.value * (area / (std::numbers::pi_v<float> * l.radius * l.radius));
     return v;
   }
-  v.intensity = l.value * area;
+  v.intensity = scene_.light_value(l, at) * area;
   spread(l, v);
   return v;
 }

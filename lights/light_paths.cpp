@@ -23,6 +23,12 @@ struct LightPath {
   Vec3f disk_centre{};  // as EmittedRay has it
   float disk_radius = 0.0f;
   bool shadows = true;
+  LightReach reach{};
+  // It has met nothing yet that scatters: what its lamp does not reach, it does not light, nor is stopped by.
+  bool first() const { return (kind & kShadowRay) != 0; }
+  bool stopped_by(const Mesh& mesh) const {
+    return !first() || (shadows && (mesh.mask & kShadowRay) != 0 && in_set(mesh.not_blocking, reach.blockers));
+  }
 };
 
 // Follows paths [first, last) in step, so that rays are traced in batches.
@@ -39,7 +45,7 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
     if (!(max_component(e.flux) > 0.0f)) continue;
     paths.push_back({e.origin, e.direction, e.flux, e.group, e.emitter, rng});
     paths.back().disk_centre = e.disk_centre, paths.back().disk_radius = e.disk_radius;
-    paths.back().shadows = e.shadows;
+    paths.back().shadows = e.shadows, paths.back().reach = e.reach;
     ids.push_back(i);
   }
   std::vector<RayHit> rays;
@@ -52,14 +58,17 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
     for (size_t i = 0; i < paths.size(); ++i) {
       if (rays[i].hit.geom == kNoId) continue;
       LightPath path = paths[i];
-      const uint32_t seen_by = scene.meshes()[rays[i].hit.geom].mask;
-      if ((seen_by & kDiffuseRay) == 0) continue;  // it stops the light, and nobody sees it
+      const Mesh& mesh = scene.meshes()[rays[i].hit.geom];
+      const bool stopped = path.stopped_by(mesh);
+      const bool lights =
+          (mesh.mask & kDiffuseRay) != 0 && (!path.first() || in_set(mesh.not_lit_by, path.reach.receivers));
+      if (stopped && !lights) continue;  // and nobody sees it
       const SurfaceInteraction at = scene.interaction(rays[i]);
       path.flux *= at.bsdf.transmittance_to(at.t, path.absorption);
-      if ((path.kind & kShadowRay) != 0 && (!path.shadows || (seen_by & kShadowRay) == 0)) {
+      if (!stopped) {
         // Lit, and no shadow behind it: half of the paths stay, half go on.
-        path.flux = path.flux * 2.0f;
-        if (path.rng.next_float() < 0.5f) {
+        if (lights) path.flux = path.flux * 2.0f;
+        if (!lights || path.rng.next_float() < 0.5f) {
           path.origin = at.bsdf.origin(kTransmitted);
           paths[alive] = path, ids[alive++] = ids[i];
           continue;
@@ -84,11 +93,14 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
         }
         vpls.push_back({ids[i], path.emitter, light});
       };
-      leave(at.bsdf.lambertian_intensity(path.flux * lit));
-      light.normal = -light.normal;
-      leave(at.bsdf.passed_intensity(path.flux * lit));
+      if (!path.first() || path.reach.lights(kDiffuseRay)) {
+        leave(at.bsdf.lambertian_intensity(path.flux * lit));
+        light.normal = -light.normal;
+        leave(at.bsdf.passed_intensity(path.flux * lit));
+      }
       const auto next = at.bsdf.scatter(path.rng);
       if (!next) continue;
+      if (path.first() && (next->flags & kStraight) == 0 && !path.reach.lights(lobe_kind(next->flags))) continue;
       if ((next->flags & kStraight) == 0 && ++path.met >= options.max_depth) continue;
       if ((next->flags & kStraight) == 0) path.kind = kDiffuseRay, path.flux *= lit, path.disk_radius = 0.0f;
       path.absorption = at.bsdf.absorption_after(next->flags, path.absorption);

@@ -22,10 +22,10 @@ double profile_solid_angle(const Vpl& spot) {
 
 }  // namespace
 
-Rgb light_radiance(const Light& light, float cosine) {
-  if (!narrowed(light)) return light.value;
+Rgb light_radiance(const Light& light, const Rgb& value, float cosine) {
+  if (!narrowed(light)) return value;
   const Vpl profile = spread_profile(light);
-  return light.value * profile.intensity * (spot_falloff(profile, cosine) / cosine);
+  return value * profile.intensity * (spot_falloff(profile, cosine) / cosine);
 }
 
 void LightSampler::add_lights(std::vector<double>& weights, const Progress* progress) {
@@ -53,7 +53,7 @@ void LightSampler::add_lights(std::vector<double>& weights, const Progress* prog
       Vpl v;
       v.group = l.group;
       v.intensity = l.value;
-      v.ray_mask = shadow_mask(l);
+      set_reach(v, l);
       const auto stands = [&](const Vpl& vpl) {
         if (extended) return;
         delta_.push_back(vpl), delta_emitter_.push_back(added ? static_cast<uint32_t>(sampler_.size() - 1) : kNoId);
@@ -78,7 +78,7 @@ void LightSampler::add_lights(std::vector<double>& weights, const Progress* prog
         case LightType::disk: {
           const bool disk = l.type == LightType::disk;
           const double area = length(cross(l.u, l.v)) * (disk ? std::numbers::pi / 4 : 1.0);
-          add(disk ? Kind::disk : Kind::rectangle, i, std::numbers::pi * area * value, true);
+          add(disk ? Kind::disk : Kind::rectangle, i, std::numbers::pi * area * mean_value(l), true);
           break;
         }
         case LightType::sun:
@@ -280,6 +280,7 @@ double LightSampler::area_density(double emission) const {
 
 MeshLight mesh_light(const Mesh& mesh) {
   if ((mesh.mask & kDiffuseRay) == 0) return MeshLight::by_rays;
+  if (mesh.receivers != 0 || mesh.blockers != 0) return MeshLight::by_samples;
   // Samples pass what casts no shadow, and rays stop at the first of such surfaces: the two would not be weighted alike.
   constexpr uint32_t kByRays = kGlossyRay | kShadowRay;
   return (mesh.mask & kByRays) == kByRays ? MeshLight::by_samples_and_rays : MeshLight::by_samples;
@@ -287,7 +288,8 @@ MeshLight mesh_light(const Mesh& mesh) {
 
 bool LightSampler::found_by_rays(const Emitter& e) const {
   if (e.kind == Kind::triangle) return mesh_light(scene_.meshes()[e.index]) == MeshLight::by_samples_and_rays;
-  return e.kind != Kind::sphere && e.kind != Kind::soft && e.kind != Kind::sun;
+  return e.kind != Kind::sphere && e.kind != Kind::soft && e.kind != Kind::sun &&
+         !scene_.lights()[e.index].reach.limited();
 }
 
 double LightSampler::mesh_density(const SurfaceHit& surface) const {
@@ -297,9 +299,11 @@ double LightSampler::mesh_density(const SurfaceHit& surface) const {
   return area_density(mean_emission(material, surface.mesh, surface.triangle, surface.instance));
 }
 
-double LightSampler::light_density(uint32_t light) const {
-  return area_density(luminance(scene_.lights()[light].value));
+double LightSampler::mean_value(const Light& light) const {
+  return luminance(light.texture < 0 ? light.value : light.value * scene_.textures()[light.texture].average());
 }
+
+double LightSampler::light_density(uint32_t light) const { return area_density(mean_value(scene_.lights()[light])); }
 
 double LightSampler::environment_density(const Vec3f& towards) const {
   if (!has_environment()) return 0.0;

@@ -28,6 +28,7 @@ struct EmittedRay {
   Vec3f disk_centre{};
   float disk_radius = 0.0f;
   bool shadows = true;
+  LightReach reach{};
 };
 
 // A virtual light that stands for emitters that are not points.
@@ -52,8 +53,8 @@ struct EmitterShape {
   Vec2f along_edges(const Vec3f& at) const;
 };
 
-// Radiance of a rectangle or disk at the cosine to its axis, above 0.
-Rgb light_radiance(const Light& light, float cosine);
+// Radiance of a rectangle or disk at the cosine to its axis, above 0; `value`: Scene::light_value.
+Rgb light_radiance(const Light& light, const Rgb& value, float cosine);
 
 class LightSampler {
  public:
@@ -142,6 +143,8 @@ class LightSampler {
   };
   static void spread(const Light& light, Vpl& v);
   ExtendedSample extended_light(const Emitter& e, float weight, Rng& rng) const;
+  // Luminance of a rectangle or disk, in the mean over it.
+  double mean_value(const Light& light) const;
   // Of sample_light: density of a place whose emission has this luminance on average.
   double area_density(double emission) const;
   // Direction towards the environment, its radiance and density per steradian, from u and v in [0,1).

@@ -83,11 +83,13 @@ LightSampler::Surface LightSampler::sample_surface(const Emitter& e, Rng& rng) c
   }
   const Vec3f n = cross(l.u, l.v);
   const float parallelogram = length(n);
-  if (e.kind == Kind::rectangle)
-    return {l.position + l.u * (u - 0.5f) + l.v * (v - 0.5f), n / parallelogram, l.value, 1.0f / parallelogram, offset};
+  if (e.kind == Kind::rectangle) {
+    const Vec3f at = l.position + l.u * (u - 0.5f) + l.v * (v - 0.5f);
+    return {at, n / parallelogram, scene_.light_value(l, at), 1.0f / parallelogram, offset};
+  }
   const float r = 0.5f * std::sqrt(u), phi = 2.0f * kPi * v;
-  return {l.position + l.u * (r * std::cos(phi)) + l.v * (r * std::sin(phi)), n / parallelogram, l.value,
-          4.0f / (kPi * parallelogram), offset};
+  const Vec3f at = l.position + l.u * (r * std::cos(phi)) + l.v * (r * std::sin(phi));
+  return {at, n / parallelogram, scene_.light_value(l, at), 4.0f / (kPi * parallelogram), offset};
 }
 
 Vec3f LightSampler::sample_environment(double u, double v, Rgb& radiance, float& pdf) const {
@@ -133,6 +135,7 @@ Vpl LightSampler::environment_light(uint64_t i, uint64_t count, uint64_t seed) c
   vpl.normal = -sample_environment(u, v, radiance, pdf);
   vpl.intensity = radiance / (pdf * static_cast<float>(count));
   vpl.group = scene_.environment().group;
+  set_reach(vpl, scene_.environment());
   return vpl;
 }
 
@@ -175,7 +178,7 @@ LightSampler::ExtendedSample LightSampler::extended_light(const Emitter& e, floa
     const Light& l = scene_.lights()[e.index];
     Vpl v;
     v.kind = VplKind::directional, v.normal = sample_sun(l, rng), v.intensity = l.value * weight, v.group = l.group;
-    v.ray_mask = shadow_mask(l);
+    set_reach(v, l);
     return {v, 0.0f, 0.0f};
   }
   if (e.kind == Kind::soft) {
@@ -186,7 +189,10 @@ LightSampler::ExtendedSample LightSampler::extended_light(const Emitter& e, floa
   const Surface s = sample_surface(e, rng);
   const uint32_t group = e.kind == Kind::triangle ? scene_.meshes()[e.index].group : scene_.lights()[e.index].group;
   Vpl v = oriented(s.position, s.normal, s.radiance * (weight / s.area_pdf), group);
-  if (e.kind != Kind::triangle) spread(scene_.lights()[e.index], v), v.ray_mask = shadow_mask(scene_.lights()[e.index]);
+  if (e.kind == Kind::triangle)
+    set_reach(v, scene_.meshes()[e.index]);
+  else
+    spread(scene_.lights()[e.index], v), set_reach(v, scene_.lights()[e.index]);
   return {v, s.area_pdf, s.offset};
 }
 
@@ -202,7 +208,8 @@ DirectSample LightSampler::sample_light(Rng& rng) const {
     s.density = environment_share_ * pdf;
     s.vpl.intensity = radiance / static_cast<float>(s.density);
     s.vpl.group = scene_.environment().group;
-    s.seen_by_rays = true;
+    set_reach(s.vpl, scene_.environment());
+    s.seen_by_rays = !scene_.environment().reach.limited();
     return s;
   }
   double rest;
@@ -322,7 +329,13 @@ EmittedRay LightSampler::sample_ray(Rng& rng, const DiscreteDistribution* chance
     }
   }
   ray.flux = ray.flux * weight, ray.emitter = static_cast<uint32_t>(i);
-  if (e.kind != Kind::triangle && e.kind != Kind::environment) ray.shadows = scene_.lights()[e.index].shadows;
+  if (e.kind == Kind::triangle) {
+    ray.reach.receivers = scene_.meshes()[e.index].receivers, ray.reach.blockers = scene_.meshes()[e.index].blockers;
+  } else if (e.kind == Kind::environment) {
+    ray.reach.seen_by = scene_.environment().reach.seen_by;
+  } else {
+    ray.shadows = scene_.lights()[e.index].shadows, ray.reach = scene_.lights()[e.index].reach;
+  }
   return ray;
 }
 

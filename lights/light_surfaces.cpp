@@ -3,13 +3,19 @@
 #include <numbers>
 
 #include "lights/light_sampler.h"
+#include "lights/light_vpls.h"
 
 namespace lumicut {
 
-LightSurfaces::LightSurfaces(const Scene& scene) : scene_(scene) {
+LightSurfaces::LightSurfaces(const Scene& scene, bool of_camera) : scene_(scene) {
   bool disks = false;
   for (uint32_t i = 0; i < scene.lights().size(); ++i) {
     const Light& l = scene.lights()[i];
+    const bool seen = l.reach.lights(kCameraRay);
+    if (of_camera && !seen) continue;
+    if (seen && (l.type == LightType::point || l.type == LightType::spot) && l.radius > 0.0f && l.profile == 0 &&
+        max_component(l.value) > 0.0f)
+      lamps_.push_back(i);
     if (!has(l) || !(max_component(l.value) > 0.0f) || !(area(l) > 0.0f)) continue;
     const auto base = static_cast<uint32_t>(positions_.size());
     lights_.push_back(i);
@@ -47,8 +53,33 @@ bool LightSurfaces::next(const Vec3f& origin, const Vec3f& direction, float& nea
   hit.t = ray.ray.tfar;
   near = hit.t * (1.0f + 1e-5f) + 1e-12f;
   const Light& light = scene_.lights()[hit.light];
+  hit.by_rays = !light.reach.limited();
   hit.cosine = -dot(normalize(cross(light.u, light.v)), direction);
-  hit.radiance = hit.cosine > 0.0f ? light_radiance(light, hit.cosine) : Rgb{};
+  hit.radiance = hit.cosine > 0.0f
+                     ? light_radiance(light, scene_.light_value(light, origin + direction * hit.t), hit.cosine)
+                     : Rgb{};
+  return true;
+}
+
+// A sphere, or a disk that faces the ray's origin; even over its projected area, as what it lights has it.
+bool LightSurfaces::meet_lamp(uint32_t lamp, const Vec3f& origin, const Vec3f& direction, float far, Hit& hit) const {
+  const Light& l = scene_.lights()[lamp];
+  const Vec3f to_centre = l.position - origin;
+  const float along = dot(to_centre, direction), d2 = length2(to_centre), r2 = l.radius * l.radius;
+  if (!(along > 0.0f) || !(d2 > r2)) return false;
+  if (l.facing) {
+    hit.t = d2 / along;
+    if (!(length2(direction * hit.t - to_centre) < r2)) return false;
+  } else {
+    const float away2 = length2(to_centre - direction * along);
+    if (!(away2 < r2)) return false;
+    hit.t = along - std::sqrt(r2 - away2);
+  }
+  if (!(hit.t < far)) return false;
+  const Vpl emits = soft_lamp(l, {});
+  const float falloff = l.type == LightType::spot ? spot_falloff(emits, -dot(l.direction, direction)) : 1.0f;
+  hit.light = lamp, hit.cosine = 1.0f, hit.by_rays = false;
+  hit.radiance = l.value * (falloff * std::numbers::inv_pi_v<float> / r2);
   return true;
 }
 

@@ -1,5 +1,6 @@
-// Rectangles and disks that emit, as rays meet them. The camera does not see lights, but paths that leave surfaces do
-// well to: close to a light, samples of its area alone are all noise. [Veach, Guibas 1995]
+// Rectangles and disks that emit, as rays meet them. The camera sees few lights, but paths that leave surfaces do well to:
+// close to a light, samples of its area alone are all noise. [Veach, Guibas 1995] And lamps with a radius that the
+// camera sees.
 #pragma once
 
 #include <memory>
@@ -10,21 +11,25 @@ namespace lumicut {
 
 class LightSurfaces final : private HitFilter {
  public:
-  explicit LightSurfaces(const Scene& scene);
-  bool empty() const { return lights_.empty(); }
+  // `of_camera`: those alone that it sees.
+  explicit LightSurfaces(const Scene& scene, bool of_camera = false);
+  bool empty() const { return lights_.empty() && lamps_.empty(); }
 
   struct Hit {
     uint32_t light;  // of the scene
     float t, cosine;
     Rgb radiance;
+    bool by_rays;  // those find it that leave points where lights are sampled too
   };
-  // Lights that shine against a ray of unit direction, between its origin and `far`; nearest first.
+  // Lights that shine against a ray of unit direction, between its origin and `far`; rectangles and disks nearest first.
   template <typename Fn>
   void for_each_hit(const Vec3f& origin, const Vec3f& direction, float far, Fn&& fn) const {
     float near = 0.0f;
     Hit hit;
-    for (int i = 0; i < kMostLights && next(origin, direction, near, far, hit); ++i)
+    for (int i = 0; i < kMostLights && !lights_.empty() && next(origin, direction, near, far, hit); ++i)
       if (max_component(hit.radiance) > 0.0f) fn(hit);
+    for (const uint32_t lamp : lamps_)
+      if (meet_lamp(lamp, origin, direction, far, hit) && max_component(hit.radiance) > 0.0f) fn(hit);
   }
 
  private:
@@ -32,10 +37,12 @@ class LightSurfaces final : private HitFilter {
   static bool has(const Light& light) { return light.type == LightType::rectangle || light.type == LightType::disk; }
   static constexpr int kMostLights = 64;  // along one ray
   bool next(const Vec3f& origin, const Vec3f& direction, float& near, float far, Hit& hit) const;
+  bool meet_lamp(uint32_t lamp, const Vec3f& origin, const Vec3f& direction, float far, Hit& hit) const;
   bool passes(uint32_t mesh, uint32_t prim, float u, float v) const override;
 
   const Scene& scene_;
   std::vector<uint32_t> lights_;
+  std::vector<uint32_t> lamps_;  // with a radius
   std::vector<Vec3f> positions_;
   std::vector<uint32_t> indices_;
   std::unique_ptr<Accel> accel_;

@@ -7,6 +7,7 @@
 #include "lights/falloff.h"
 #include "lights/vpl.h"
 #include "scene/light.h"
+#include "scene/mesh.h"
 
 namespace lumicut {
 
@@ -25,11 +26,17 @@ inline bool narrowed(const Light& light) {
          light.spread < std::numbers::pi_v<float> - 1e-4f;
 }
 
-inline uint32_t shadow_mask(const Light& l) { return l.shadows ? uint32_t{kShadowRay} : 0u; }
+inline constexpr uint32_t kShadedLobes = kDiffuseRay | kGlossyRay;  // that virtual lights light
+inline void set_reach(Vpl& v, const Light& l) {
+  v.ray_mask = l.shadows ? blocker_ray(l.reach.blockers) : 0u;
+  v.seen_by = l.reach.seen_by & kShadedLobes, v.receivers = l.reach.receivers;
+}
+inline void set_reach(Vpl& v, const Mesh& m) { v.ray_mask = blocker_ray(m.blockers), v.receivers = m.receivers; }
+inline void set_reach(Vpl& v, const Environment& e) { v.seen_by = e.reach.seen_by & kShadedLobes; }
 
 inline Vpl spot_of(const Light& l) {
   Vpl v;
-  v.ray_mask = shadow_mask(l);
+  set_reach(v, l);
   v.kind = VplKind::spot, v.position = l.position, v.normal = l.direction, v.intensity = l.value, v.group = l.group;
   v.cos_outer() = l.cos_outer, v.blend_cosine = l.blend_cosine, v.spot_cosine = l.spot_cosine ? 1.0f : 0.0f;
   return v;
@@ -47,7 +54,7 @@ inline Vpl soft_lamp(const Light& l, const Vec3f& place) {
 // A point light with a measured profile.
 inline Vpl profiled(const Light& l, const LightProfile& profile) {
   Vpl v;
-  v.ray_mask = shadow_mask(l);
+  set_reach(v, l);
   v.kind = VplKind::spot, v.position = l.position, v.normal = l.direction, v.intensity = l.value, v.group = l.group;
   v.profile = l.profile, v.cos_outer() = profile.cos_outer();
   v.blend_cosine = l.tangent.x, v.spot_cosine = l.tangent.y, v.spread_tan = l.tangent.z;

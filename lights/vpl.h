@@ -30,6 +30,8 @@ struct Vpl {
   uint32_t profile = 0;
   // RayKind: of the rays that look for what stands before it. Bounced light comes with a ray that scattered at the point.
   uint32_t ray_mask = kShadowRay;
+  // RayKind: lobes that it lights; and the set of meshes that do, 0: all. [scene/light.h: LightReach]
+  uint32_t seen_by = kDiffuseRay | kGlossyRay, receivers = 0;
   // What a host may not know; found from where the light lies.
   float offset = 0.0f;  // how far shadow rays that start at it stand off its surface
   float cell = 0.0f;    // m² of surface that it stands for; 0: exactly its point, or distant
@@ -39,7 +41,7 @@ struct Vpl {
   float lamp_radius = 0.0f;  // 0: a point
   uint32_t facing = 0;  // 1: its disk faces what it lights; else a sphere. (No bool: lights are compared by bytes.)
   LUMICUT_FIELDS(Vpl, position, kind, normal, group, intensity, edge_or_radius, blend_cosine, spot_cosine, spread_tan,
-                 profile, ray_mask, offset, cell, clamp2, from_centre, lamp_radius, facing)
+                 profile, ray_mask, seen_by, receivers, offset, cell, clamp2, from_centre, lamp_radius, facing)
 
   // Spot: the cosine at which it has fallen to 0.
   float cos_outer() const { return edge_or_radius; }

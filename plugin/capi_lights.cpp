@@ -1,4 +1,7 @@
 // Virtual lights in and out: of lumicut.h, and with their origins by the extension "lumicut.lights/1".
+#include <algorithm>
+
+#include "lights/light_reach.h"
 #include "plugin/descriptors.h"
 #include "plugin/extensions.h"
 #include "plugin/objects.h"
@@ -57,6 +60,11 @@ lumicut_result get_set(lumicut_integrator integrator, lumicut_vpl_set* lights) {
       fail_argument(
           "parameter importance: these virtual lights were put where one camera sees them, and their origins tell "
           "nothing of its chances; lumicut_integrator_get_lights gives them without");
+    if (const Prepared* p = object(integrator).prepared.get();
+        p != nullptr && !std::all_of(p->vpls->lights.begin(), p->vpls->lights.end(), lights_all))
+      fail_argument(
+          "lumicut_vpl_set: some lamps of the scene light only kinds of lobes or sets of meshes (lumicut_light.mask, "
+          "receivers), which virtual lights do not tell");
     write(lights, prepared(integrator, "lumicut_lights_extension.get").view());
   });
 }

@@ -228,6 +228,13 @@ Mesh to_mesh(const lumicut_mesh& in) {
   mesh.material = in.material;
   mesh.mask = in.mask == 0 ? 0xffffffffu : in.mask;
   mesh.group = in.group;
+  mesh.not_lit_by = in.not_lit_by, mesh.not_blocking = in.not_blocking;
+  if (in.not_blocking >> kBlockerSets != 0)
+    c.fail("not_blocking",
+           number_text(uint64_t{in.not_blocking}) + " names sets beyond " + number_text(uint64_t{kBlockerSets}));
+  c.integer("receivers", in.receivers, 0, kReceiverSets);
+  c.integer("blockers", in.blockers, 0, kBlockerSets);
+  mesh.receivers = in.receivers, mesh.blockers = in.blockers;
   return mesh;
 }
 
@@ -275,6 +282,11 @@ Light to_light(const lumicut_light& in, uint64_t index, const std::vector<Profil
   light.facing = (in.flags & LUMICUT_FACING_DISK) != 0, light.shadows = (in.flags & LUMICUT_NO_SHADOWS) == 0;
   if (light.facing && !point && !spot)
     c.fail("flags", std::string("LUMICUT_FACING_DISK is not for a ") + type_name(in.type));
+  c.flags("mask", in.mask, kAllRays);
+  if (in.mask != 0) light.reach.seen_by = in.mask & ~uint32_t{kShadowRay};
+  c.integer("receivers", in.receivers, 0, kReceiverSets);
+  c.integer("blockers", in.blockers, 0, kBlockerSets);
+  light.reach.receivers = in.receivers, light.reach.blockers = in.blockers;
   if (spot || sun) light.direction = c.direction("direction", in.direction);
   if (spot) {
     c.range("angle", in.angle, kMinAngle, kPi + 1e-5f);
@@ -302,6 +314,7 @@ Light to_light(const lumicut_light& in, uint64_t index, const std::vector<Profil
     if (given != Vec3f{} && !(length2(across) > 1e-10f * length2(given))) c.fail("tangent", "is parallel to direction");
     light.tangent = given != Vec3f{} ? normalize(across) : Frame(light.direction).t;
   }
+  if (in.texture != 0 && !area) c.fail("texture", std::string("a ") + type_name(in.type) + " has none");
   if (area) {
     c.coordinate("u", in.u);
     c.coordinate("v", in.v);
@@ -314,6 +327,7 @@ Light to_light(const lumicut_light& in, uint64_t index, const std::vector<Profil
     light.spread = in.spread == 0.0f ? kPi : in.spread;
     c.range("spread", light.spread, kMinAngle, kPi + 1e-5f);
     light.spread = std::min(light.spread, kPi);
+    light.texture = texture_index(c, "texture", in.texture);
     if (in.unit == LUMICUT_WATT) scale /= 4.0 * box * (in.type == LUMICUT_DISK ? 0.25 * std::numbers::pi : 1.0);
   } else if (in.unit == LUMICUT_WATT && !sun) {
     scale /= 4.0 * std::numbers::pi;
@@ -335,6 +349,8 @@ Environment to_environment(const lumicut_environment& in) {
   Environment e;
   e.group = in.group;
   e.hidden = (in.flags & LUMICUT_HIDDEN) != 0;
+  c.flags("mask", in.mask, kAllRays);
+  if (in.mask != 0) e.reach.seen_by = in.mask & (kDiffuseRay | kGlossyRay | kTransmissionRay);
   e.color = vec(in.color);
   e.texture = texture_index(c, "texture", in.texture);
   bool given = false;
@@ -638,6 +654,9 @@ FrameOptions to_frame_options(const lumicut_render_desc& in) {
   o.illuminance = (in.flags & LUMICUT_ILLUMINANCE) != 0;
   o.denoise = (in.flags & LUMICUT_DENOISE) != 0;
   o.filter = to_filter(c, in);
+  c.flags("lobes", in.lobes, kDiffuseRay | kGlossyRay | kTransmissionRay);
+  c.range("occlusion", in.occlusion, 0.0f, kLargestCoordinate);
+  o.lobes = in.lobes, o.direct = (in.flags & LUMICUT_DIRECT) != 0, o.occlusion = in.occlusion;
   // A batch holds at least a tile's samples: tiles shrink rather than let memory grow with the samples.
   const auto tile_points = [&] { return uint64_t{o.tile_size} * o.tile_size * o.samples; };
   o.tile_size = in.tile_size == 0 ? 64 : in.tile_size;
@@ -665,7 +684,8 @@ IterationOptions to_pass_options(const lumicut_render_desc& in) {
   c.range("target_error", in.target_error, 0.0f, 1e6f);
   c.range("confidence", in.confidence, 0.0f, 0.999999f);
   c.flags("flags", in.flags,
-          LUMICUT_CHECKPOINTS | LUMICUT_ILLUMINANCE | LUMICUT_GROUPS | LUMICUT_DENOISE | LUMICUT_KEEP_FIREFLIES);
+          LUMICUT_CHECKPOINTS | LUMICUT_ILLUMINANCE | LUMICUT_GROUPS | LUMICUT_DENOISE | LUMICUT_KEEP_FIREFLIES |
+              LUMICUT_DIRECT);
   if (in.checkpoint != nullptr && in.checkpoint_size == 0) c.fail("checkpoint_size", "0 bytes are no checkpoint");
   c.integer("checkpoint_size", in.checkpoint_size, 0, kMostCheckpointBytes);
   if (in.checkpoint == nullptr && in.checkpoint_size != 0)

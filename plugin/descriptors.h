@@ -48,13 +48,14 @@ LUMICUT_DESCRIPTOR(lumicut_material, F(struct_size), F(flags), F(diffuse), F(shi
                    F(absorption));
 LUMICUT_DESCRIPTOR(lumicut_mesh, F(struct_size), F(mask), F(positions), F(normals), F(uvs), F(vertex_count), F(indices),
                    F(triangle_count), F(materials), F(transforms), F(transform_count), F(material), F(group),
-                   F(attributes), F(attribute_count));
+                   F(attributes), F(attribute_count), F(not_lit_by), F(not_blocking), F(receivers), F(blockers));
 LUMICUT_DESCRIPTOR(lumicut_light, F(struct_size), F(type), F(unit), F(group), F(color), F(value), F(position),
                    F(radius), F(direction), F(angle), F(u), F(blend), F(v), F(spread), F(spot_cosine), F(profile),
-                   F(tangent), F(flags));
+                   F(tangent), F(flags), F(mask), F(receivers), F(blockers), F(texture));
 LUMICUT_DESCRIPTOR(lumicut_profile, F(struct_size), F(vertical_count), F(horizontal_count), F(reserved), F(vertical),
                    F(horizontal), F(values));
-LUMICUT_DESCRIPTOR(lumicut_environment, F(struct_size), F(group), F(color), F(texture), F(world_to_map), F(flags));
+LUMICUT_DESCRIPTOR(lumicut_environment, F(struct_size), F(group), F(color), F(texture), F(world_to_map), F(flags),
+                   F(mask));
 LUMICUT_DESCRIPTOR(lumicut_camera, F(struct_size), F(orthographic), F(to_world), F(fov_y), F(height), F(shift),
                    F(near_clip), F(far_clip), F(pixel_aspect), F(lens_radius), F(focus_distance), F(panorama),
                    F(fisheye_fov), F(fisheye_lens), F(sensor), F(longitude), F(latitude));
@@ -65,7 +66,7 @@ LUMICUT_DESCRIPTOR(lumicut_param_info, F(struct_size), F(type), F(id), F(label),
                    F(default_text), F(minimum), F(maximum));
 LUMICUT_DESCRIPTOR(lumicut_render_desc, F(struct_size), F(width), F(height), F(samples), F(crop), F(tile_size),
                    F(passes), F(max_seconds), F(target_error), F(confidence), F(flags), F(checkpoint),
-                   F(checkpoint_size), F(filter), F(filter_width));
+                   F(checkpoint_size), F(filter), F(filter_width), F(lobes), F(occlusion));
 LUMICUT_DESCRIPTOR(lumicut_tile, F(struct_size), F(x0), F(y0), F(x1), F(y1));
 LUMICUT_DESCRIPTOR(lumicut_channel_info, F(struct_size), F(components), F(name), F(description));
 

@@ -31,12 +31,13 @@ struct ClampCompensation::Search {
 };
 
 ClampCompensation::ClampCompensation(const Scene& scene, const Clamp& clamp, const NearbyLights* nearby, bool spheres,
-                                     bool trace_gloss, uint64_t seed)
+                                     bool trace_gloss, bool direct, uint64_t seed)
     : scene_(scene),
       clamp_(clamp),
       nearby_(nearby),
       spheres_(spheres),
       trace_gloss_(trace_gloss),
+      direct_(direct),
       seed_(seed),
       light_surfaces_(scene) {}
 
@@ -49,6 +50,7 @@ void ClampCompensation::find_lights(const Search& search, size_t ray, TracedPoin
   const RayHit& r = search.rays[ray];
   const Search::Carried& c = search.carried[ray];
   light_surfaces_.for_each_hit(r.ray.org, r.ray.dir, r.ray.tfar, [&](const LightSurfaces::Hit& seen) {
+    if (!seen.by_rays) return;
     const float distance = c.travelled + seen.t;
     const float share = nearby_ != nullptr ? nearby_->light_share(c.from, seen.light, distance, c.pdf)
                                            : lost_at(search, r.ray.org + r.ray.dir * seen.t, distance);
@@ -72,9 +74,9 @@ void ClampCompensation::find_surface(Search& search, size_t ray, TracedPoints& h
   }
   // Mirrors and glass show it what is behind them: no virtual light shines by way of those, except straight on.
   if (auto next =
-          start_chain(at.bsdf, weight, c.pixel, c.rng, {c.passages, Passage::straight, r.ray.mask, c.absorption})) {
+          start_chain(at.bsdf, weight, c.pixel, c.rng, {c.passages, Passage::straight, r.ray.mask, c.absorption, 0})) {
     if (!next->straight) {
-      search.chains.push_back(*next);
+      if (!direct_) search.chains.push_back(*next);
     } else if (c.passages < kMostStraight) {
       RayHit& on = search.next_rays.emplace_back();
       on.ray.org = next->origin, on.ray.dir = next->direction, on.ray.mask = next->state.kind;
@@ -82,7 +84,7 @@ void ClampCompensation::find_surface(Search& search, size_t ray, TracedPoints& h
                                      next->state.absorption, c.passages + 1, c.gloss});
     }
   }
-  if (at.bsdf.layers().empty()) return;
+  if (direct_ || at.bsdf.layers().empty()) return;
   Rng& rng = c.rng;
   // Spheres stand for all that is reflected evenly.
   const float lost = spheres_ ? 0.0f : lost_at(search, at.position, distance);

@@ -15,10 +15,10 @@ namespace lumicut {
 class ClampCompensation {
  public:
   // `nearby`: samples what the clamp takes from emitters with extent; null: rays alone bring it. `spheres`: virtual lights
-  // on surfaces are, and lose nothing by it. `trace_gloss`: rays bring a part of the gloss of bounced light. All outlive
-  // this.
+  // on surfaces are, and lose nothing by it. `trace_gloss`: rays bring a part of the gloss of bounced light. `direct`: of
+  // what rays find, what shines alone. All outlive this.
   ClampCompensation(const Scene& scene, const Clamp& clamp, const NearbyLights* nearby, bool spheres, bool trace_gloss,
-                    uint64_t seed);
+                    bool direct, uint64_t seed);
 
   // One ray from each point (unless it is cut short by chance, or the point is black). `level` counts the surfaces since
   // the camera. Appends to `hits`. Deterministic: numbers belong to the places of points. Throws Error(cancelled).
@@ -35,7 +35,7 @@ class ClampCompensation {
   const Scene& scene_;
   const Clamp& clamp_;
   const NearbyLights* const nearby_;
-  const bool spheres_, trace_gloss_;
+  const bool spheres_, trace_gloss_, direct_;
   const uint64_t seed_;
   LightSurfaces light_surfaces_;
 };

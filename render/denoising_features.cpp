@@ -66,9 +66,9 @@ void FeatureTracer::follow(std::vector<Way> ways, const Progress& progress, Coun
     for (size_t i = 0; i < ways.size(); ++i) {
       Way& way = ways[i];
       bool goes_on = false;
-      if (rays[i].hit.geom == kNoId)
+      if (rays[i].hit.geom == kNoId && scene_.environment().reach.lights(rays[i].ray.mask))
         way.seen.albedo += way.throughput * at_most_one(scene_.environment_radiance(rays[i].ray.dir));
-      else
+      else if (rays[i].hit.geom != kNoId)
         goes_on = add(scene_.interaction(rays[i], way.pixel), way) && depth < kMostSurfaces;
       if (goes_on)
         next.push_back(way);

@@ -6,10 +6,12 @@
 
 #include "core/parallel.h"
 #include "core/rng.h"
+#include "lights/light_reach.h"
 #include "render/camera_rays.h"
 #include "render/clamp_compensation.h"
 #include "render/denoising_features.h"
 #include "render/traced_gloss.h"
+#include "scene/rng_at_point.h"
 
 namespace lumicut {
 
@@ -37,10 +39,15 @@ struct PixelSums {
 
 class Batch {
  public:
-  // `surfaces`: where anything of the scene may be specular.
+  // `surfaces`: where anything of the scene may be specular. `seen`: where the camera sees lamps.
   Batch(const Scene& scene, std::span<const GroupMethod> methods, const FrameOptions& options, const CameraRays& camera,
-        const LightSurfaces* surfaces)
-      : scene_(scene), methods_(methods), options_(options), camera_(camera), light_surfaces_(surfaces) {}
+        const LightSurfaces* surfaces, const LightSurfaces* seen)
+      : scene_(scene),
+        methods_(methods),
+        options_(options),
+        camera_(camera),
+        light_surfaces_(surfaces),
+        seen_lamps_(seen) {}
 
   void add_tile(const Rect& tile) {
     tiles_.push_back(tile);
@@ -78,6 +85,7 @@ class Batch {
         const size_t p = begin + i / samples;
         const size_t at = begin * samples + i;
         if (rays[i].ray.mask == 0) continue;
+        if (seen_lamps_ != nullptr) see_lamps(rays[i], p);
         if (rays[i].hit.geom == kNoId) {
           miss(rays[i], p);
           if (features_) features_->miss(static_cast<uint32_t>(p), rays[i].ray.dir);
@@ -94,6 +102,11 @@ class Batch {
           std::copy(layers.begin() + 1, layers.end(), further.begin() + static_cast<ptrdiff_t>(most_further * at));
         }
         if (seen.bsdf.is_specular()) chain[at] = start_chain_of(seen.bsdf, p, i % samples);
+        if (options_.lobes == 0) continue;
+        limit(found[at], options_.lobes, 0);
+        for (size_t k = 0; k < further_count_of(further_count, at); ++k)
+          limit(further[most_further * at + k], options_.lobes, 0);
+        if (chain.size() > at && chain[at] && (chain[at]->state.kind & options_.lobes) == 0) chain[at].reset();
       }
       if (ways.empty()) return;
       Counters counters;
@@ -117,7 +130,7 @@ class Batch {
       if (ray) rays.push_back(*ray);
     if (rays.empty()) return;
     Counters counters;
-    follow_chains(scene_, *light_surfaces_, std::move(rays), context.progress, seen_, counters);
+    follow_chains(scene_, *light_surfaces_, std::move(rays), context.progress, seen_, counters, options_.direct);
     context.stats.add(counters);
   }
 
@@ -126,6 +139,7 @@ class Batch {
     light_.assign(methods_.size(), std::vector<Rgb>(pixels_.size()));
     counts_.assign(pixels_.size(), {});
     if (options_.denoise) residual_.assign(pixels_.size(), {});
+    if (options_.occlusion > 0.0f) return occlude(context);
     shade_levels(points_, nearby, compensation, light_, context, options_.denoise ? Noise::beside_lights : Noise::none);
     for (size_t i = 0; i < seen_.light.size(); ++i) light_[slot(seen_.group[i])][seen_.pixel[i]] += seen_.light[i];
     if (options_.denoise)
@@ -141,7 +155,7 @@ class Batch {
       const SurfacePoint place = points_.get(i);
       SurfacePoint point;  // of its material it has nothing
       point.position = place.position, point.normal = place.normal, point.mirror = place.mirror;
-      point.pixel = place.pixel;
+      point.pixel = place.pixel, point.not_lit_by = place.not_lit_by;
       point.diffuse = Rgb{1, 1, 1} * std::numbers::inv_pi_v<float>;
       white.push(point);
     }
@@ -217,7 +231,7 @@ class Batch {
       for (size_t i = 0; i < hits.light.size(); ++i) light[slot(hits.group[i])][hits.pixel[i]] += hits.light[i];
       if (noise != Noise::none)
         for (size_t i = 0; i < hits.light.size(); ++i) residual_[hits.pixel[i]] += hits.light[i];
-      if (compensation == nullptr) return;
+      if (compensation == nullptr || options_.direct) return;
       found = hits.points();
       points = &found;
     }
@@ -269,19 +283,77 @@ class Batch {
     sum.seen.emplace_back(group, radiance);
   }
 
+  static size_t further_count_of(const std::vector<uint8_t>& counts, size_t at) {
+    return counts.empty() ? 0 : counts[at];
+  }
+  // What is seen to emit is in the image.
+  bool shows_emission() const { return options_.lobes == 0 && !(options_.occlusion > 0.0f); }
+
+  // Of each first point the share of rays that meet nothing nearby.
+  void occlude(ShadeContext context) {
+    constexpr uint32_t kRays = 16;
+    constexpr size_t kChunk = 1024;
+    std::vector<float> open(points_.size());
+    parallel_chunks(points_.size(), kChunk, [&](size_t begin, size_t end) {
+      if (context.progress.cancelled()) return;
+      std::vector<Ray> rays;
+      for (size_t i = begin; i < end; ++i) {
+        const SurfacePoint point = points_.get(i);
+        Rng rng = rng_at_point(scene_, point, hash64(options_.seed, kRays), Stage::nearby_lights);
+        const float shift_u = rng.next_float(), shift_v = rng.next_float();
+        for (uint32_t k = 0; k < kRays; ++k) {
+          // Even for any number of samples. [Roberts 2018: R2]
+          const float u = shift_u + static_cast<float>(k) * 0.75487767f,
+                      v = shift_v + static_cast<float>(k) * 0.5698403f;
+          Ray ray;
+          ray.org = point.position;
+          ray.dir = sample_cosine_hemisphere(point.normal, u - std::floor(u), v - std::floor(v));
+          ray.tfar = options_.occlusion, ray.mask = kShadowRay;
+          rays.push_back(ray);
+        }
+      }
+      scene_.accel().occluded(rays);
+      for (size_t i = 0; i < rays.size(); ++i)
+        if (!(rays[i].tfar < 0.0f)) open[begin + i / kRays] += 1.0f / kRays;
+    });
+    context.progress.check();
+    for (size_t i = 0; i < points_.size(); ++i) {
+      if (!further_.empty() && further_[i]) continue;
+      const Rgb grey = Rgb{1, 1, 1} * open[i];
+      light_[0][points_.pixel[i]] += grey;
+      if (options_.denoise) residual_[points_.pixel[i]] += grey;
+    }
+    seen_ = {};
+  }
+
+  void see_lamps(const RayHit& ray, size_t p) {
+    if (!shows_emission()) return;
+    seen_lamps_->for_each_hit(ray.ray.org, ray.ray.dir, ray.ray.tfar, [&](const LightSurfaces::Hit& lamp) {
+      see(sums_[p], scene_.lights()[lamp.light].group, lamp.radiance);
+    });
+  }
+
   void miss(const RayHit& ray, size_t p) {
-    if (!scene_.environment().hidden)
+    if (!scene_.environment().hidden && shows_emission())
       see(sums_[p], scene_.environment().group, scene_.environment_radiance(ray.ray.dir));
   }
 
   // Into the sums of pixel p.
   void first_hit(const SurfaceInteraction& at, size_t p, float cosine) {
     PixelSums& sum = sums_[p];
-    see(sum, scene_.meshes()[at.mesh].group, at.emitted);
+    if (shows_emission()) see(sum, scene_.meshes()[at.mesh].group, at.emitted);
     sum.normal += at.bsdf.normal();
-    sum.albedo += at.bsdf.albedo();
+    sum.albedo += options_.lobes == 0 ? at.bsdf.albedo() : albedo_of_lobes(at.bsdf);
     if (sum.hits == 0.0f) sum.position = at.position, sum.depth = at.t * cosine;
     sum.hits += 1.0f;
+  }
+
+  Rgb albedo_of_lobes(const Bsdf& bsdf) const {
+    Rgb sum{};
+    if ((options_.lobes & kDiffuseRay) != 0) sum += bsdf.even_color();
+    if ((options_.lobes & kGlossyRay) != 0) sum += bsdf.reflected_color();
+    if ((options_.lobes & kTransmissionRay) != 0) sum += bsdf.passed_color();
+    return sum;
   }
 
   // What a mirror or glass goes on to show.
@@ -299,6 +371,7 @@ class Batch {
   const FrameOptions& options_;
   const CameraRays& camera_;
   const LightSurfaces* const light_surfaces_;
+  const LightSurfaces* const seen_lamps_;
   std::vector<Rect> tiles_;
   std::vector<Pixel> pixels_;
   std::vector<PixelSums> sums_;
@@ -358,9 +431,14 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
   const CameraRays camera(scene.camera(), options);
   std::optional<LightSurfaces> light_surfaces;
   if (scene.may_be_specular()) light_surfaces.emplace(scene);
+  std::optional<LightSurfaces> seen_lamps;
+  if (std::any_of(scene.lights().begin(), scene.lights().end(),
+                  [](const Light& l) { return l.reach.lights(kCameraRay); }))
+    seen_lamps.emplace(scene, true);
   std::optional<ClampCompensation> compensation;
   if (light.compensated != nullptr)
-    compensation.emplace(scene, *light.compensated, light.nearby, light.spheres, light.trace_gloss, options.seed);
+    compensation.emplace(scene, *light.compensated, light.nearby, light.spheres, light.trace_gloss, options.direct,
+                         options.seed);
   context.progress.begin("render", size_t{options.crop.width()} * options.crop.height());
   tbb::parallel_for(
       tbb::blocked_range<size_t>(0, batches.size(), 1),
@@ -368,7 +446,8 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
         const CurrentWork current(&context.progress);
         for (size_t b = range.begin(); b < range.end(); ++b) {
           context.progress.check();
-          Batch batch(scene, methods, options, camera, light_surfaces ? &*light_surfaces : nullptr);
+          Batch batch(scene, methods, options, camera, light_surfaces ? &*light_surfaces : nullptr,
+                      seen_lamps ? &*seen_lamps : nullptr);
           for (size_t t = batches[b].first; t < batches[b].second; ++t) batch.add_tile(tiles[t]);
           batch.collect(context);
           batch.shade(light.nearby, compensation ? &*compensation : nullptr, context);

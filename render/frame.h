@@ -26,8 +26,11 @@ struct FrameOptions {
   bool illuminance = false;  // fill that channel: about as long again
   bool denoise = false;      // fill the channels of denoising
   PixelFilter filter;
+  uint32_t lobes = 0;      // RayKind: what these of the first surfaces show, alone; 0: all
+  bool direct = false;     // light alone that comes straight from what emits
+  float occlusion = 0.0f;  // above 0: the image is ambient occlusion within this distance
   LUMICUT_FIELDS(FrameOptions, width, height, samples, tile_size, crop, seed, camera_samples, illuminance, denoise,
-                 filter)
+                 filter, lobes, direct, occlusion)
 };
 
 // Tiles of the crop in the order they are rendered.

@@ -3,6 +3,7 @@
 #include "bsdf/point_bsdf.h"
 #include "clustering/light_kernel.h"
 #include "core/sampling.h"
+#include "lights/light_reach.h"
 #include "scene/rng_at_point.h"
 
 namespace lumicut {
@@ -47,14 +48,14 @@ void NearbyLights::trace(const ShadePoints& points, const Options& options, cons
       const auto s =
           near_.sample(point.position, std::min(choice, 0x1.fffffep-1f), u - std::floor(u), v - std::floor(v));
       if (!s) continue;
-      Rgb light = light_point(s->vpl, s->vpl.intensity * (1.0f / kSamples), {}, point);
+      Rgb light = light_point(s->vpl, s->vpl.intensity * (1.0f / kSamples), {}, limited(point, s->vpl));
       if (!(max_component(light) > 0.0f) || !is_finite(light)) continue;
       const Vec3f to_light = s->vpl.position - point.position;
       if (options.rays && s->found_by_rays)
         light *= power_heuristic(kSamples * s->density, bsdf.pdf(normalize(to_light)));
       Ray ray;  // ends before a mesh, which blocks
       ray.org = point.position, ray.dir = to_light + s->vpl.normal * s->offset;
-      ray.tnear = 0.0f, ray.tfar = 1.0f, ray.mask = kShadowRay;
+      ray.tnear = 0.0f, ray.tfar = 1.0f, ray.mask = s->vpl.ray_mask;
       waiting.shadows.push_back(ray), waiting.light.push_back(light);
       waiting.pixel.push_back(options.by_point ? static_cast<uint32_t>(i) : point.pixel);
       waiting.group.push_back(s->vpl.group);

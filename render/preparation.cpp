@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "render/identity.h"
+#include "render/limited_lights.h"
 
 namespace lumicut {
 
@@ -98,8 +99,8 @@ void Preparation::prepare(const Scene& scene, std::shared_ptr<const void> scene_
   progress.check();
   into.set_value("vpls", static_cast<double>(next->vpls->lights.size()));
   into.set_value("light_paths", static_cast<double>(next->vpls->light_paths));
-  next->method = entry.create();
   next->place_lights(entry.light_source, progress);
+  next->method = create_method(entry, next->standing_off);
   next->method->prepare(scene, next->standing_off, *next->params, {progress, into});
   progress.check();
   prepared = std::move(next);

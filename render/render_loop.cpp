@@ -6,6 +6,7 @@
 #include "core/current_work.h"
 #include "film/denoise.h"
 #include "render/checkpoint.h"
+#include "render/limited_lights.h"
 #include "render/traced_gloss.h"
 
 namespace lumicut {
@@ -45,12 +46,13 @@ std::vector<GroupMethod> RenderLoop::methods(const Prepared& prepared, std::vect
                                              Progress& progress, Stats& stats) const {
   const bool trace_gloss = frame_light(prepared).trace_gloss;
   const std::vector<uint32_t> all_light{0}, &groups = film_.groups().empty() ? all_light : film_.groups();
-  if (film_.groups().empty() && !trace_gloss) return {{0, prepared.method.get()}};
+  const bool direct = options_.direct && prepared.vpls->light_paths > 0;
+  if (film_.groups().empty() && !trace_gloss && !direct) return {{0, prepared.method.get()}};
   of_groups.clear();
   of_groups.resize(groups.size());
   const VplSet& set = prepared.standing_off;
   for (OfGroup& of : of_groups) of.lights.profiles = of.bounced_lights.profiles = set.profiles;
-  for (size_t i = 0; i < set.lights.size(); ++i) {
+  for (size_t i = 0; i < (direct ? set.direct : set.lights.size()); ++i) {
     auto at = groups.begin();
     if (!film_.groups().empty()) at = std::lower_bound(groups.begin(), groups.end(), set.lights[i].group);
     if (at == groups.end() || (!film_.groups().empty() && *at != set.lights[i].group)) continue;
@@ -60,7 +62,7 @@ std::vector<GroupMethod> RenderLoop::methods(const Prepared& prepared, std::vect
   const auto prepare = [&](const VplSet& lights, std::unique_ptr<Integrator>& method) {
     progress.check();
     if (lights.lights.empty()) return;
-    method = preparation_.entry.create();
+    method = create_method(preparation_.entry, lights);
     method->prepare(scene_, lights, *prepared.params, {progress, stats});
   };
   std::vector<GroupMethod> all;
@@ -72,11 +74,17 @@ std::vector<GroupMethod> RenderLoop::methods(const Prepared& prepared, std::vect
   return all;
 }
 
+// Paths that end where they meet what emits, where direct light alone is asked for.
+Params RenderLoop::as_wanted(Params params) const {
+  if (options_.direct && preparation_.entry.light_source == LightSource::emitters) params.set("max_depth", "0");
+  return params;
+}
+
 void RenderLoop::run(Progress& progress, Stats& stats, const std::function<void(const Rect&)>& tile_done) {
   const CurrentWork current(&progress);
   progress.check();
   if (progressive_) return render_iterations(progress, stats, tile_done);
-  preparation_.prepare(scene_, scene_owner_, preparation_.params, progress, stats, whole_frame());
+  preparation_.prepare(scene_, scene_owner_, as_wanted(preparation_.params), progress, stats, whole_frame());
   const Prepared& prepared = *preparation_.prepared;
   {
     const PhaseTimer timer(stats, "render");
@@ -114,8 +122,8 @@ void RenderLoop::render_iterations(Progress& progress, Stats& stats,
     state_ = {done, error, std::move(bytes)};
   };
   const auto prepare = [&](uint32_t iteration) {
-    preparation_.prepare(scene_, scene_owner_, params_of_iteration(preparation_.params, iteration, scene_), progress,
-                         stats, whole_frame());
+    preparation_.prepare(scene_, scene_owner_, as_wanted(params_of_iteration(preparation_.params, iteration, scene_)),
+                         progress, stats, whole_frame());
   };
   if (!iterations_.resume.empty()) {
     done = load_checkpoint(iterations_.resume, key, mean, film_);

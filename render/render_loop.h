@@ -57,6 +57,7 @@ class RenderLoop {
   };
   void render_iterations(Progress& progress, Stats& stats, const std::function<void(const Rect&)>& tile_done);
   FrameSize whole_frame() const { return {options_.width, options_.height}; }
+  Params as_wanted(Params params) const;
   FrameOptions frame_options(const Prepared& prepared) const;
   FrameLight frame_light(const Prepared& prepared) const;
   std::vector<GroupMethod> methods(const Prepared& prepared, std::vector<OfGroup>& of_groups, Progress& progress,

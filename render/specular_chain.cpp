@@ -23,12 +23,13 @@ std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uin
                   pixel,
                   rng,
                   {state.bounces + 1, state.passage, ray_kind(s->flags, state.kind),
-                   bsdf.absorption_after(s->flags, state.absorption)},
+                   bsdf.absorption_after(s->flags, state.absorption),
+                   (s->flags & kStraight) != 0 ? state.not_lit_by : bsdf.not_lit_by()},
                   (s->flags & kStraight) != 0};
 }
 
 void follow_chains(const Scene& scene, const LightSurfaces& light_surfaces, std::vector<ChainRay> chains,
-                   const Progress& progress, TracedPoints& hits, Counters& counters) {
+                   const Progress& progress, TracedPoints& hits, Counters& counters, bool direct) {
   std::vector<RayHit> rays;
   for (uint32_t depth = 0; depth < kMaxSurfaces && !chains.empty(); ++depth) {
     rays.assign(chains.size(), {});
@@ -44,9 +45,12 @@ void follow_chains(const Scene& scene, const LightSurfaces& light_surfaces, std:
       if (!light_surfaces.empty())
         light_surfaces.for_each_hit(
             chain.origin, chain.direction, rays[i].ray.tfar, [&](const LightSurfaces::Hit& seen) {
+              const LightReach& reach = scene.lights()[seen.light].reach;
+              if (!reach.lights(chain.state.kind) || !in_set(chain.state.not_lit_by, reach.receivers)) return;
               hits.add(chain.throughput * seen.radiance, chain.pixel, scene.lights()[seen.light].group);
             });
       if (rays[i].hit.geom == kNoId) {
+        if (!scene.environment().reach.lights(chain.state.kind)) continue;
         const Rgb light = chain.throughput * scene.environment_radiance(chain.direction);
         if (max_component(light) > 0.0f) hits.add(light, chain.pixel, scene.environment().group);
         continue;
@@ -55,6 +59,7 @@ void follow_chains(const Scene& scene, const LightSurfaces& light_surfaces, std:
       chain.throughput *= at.bsdf.transmittance_to(at.t, chain.state.absorption);
       const Rgb light = chain.throughput * at.emitted;
       if (max_component(light) > 0.0f) hits.add(light, chain.pixel, scene.meshes()[at.mesh].group);
+      if (direct) continue;
       for (SurfacePoint point : at.bsdf.layers()) {
         point.attenuate(chain.throughput);
         if (!PointBsdf(point).black()) hits.found.push_back(point);

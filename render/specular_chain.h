@@ -19,6 +19,7 @@ struct ChainRay {
     Passage passage = Passage::refracted;
     uint32_t kind = kCameraRay;  // RayKind
     Rgb absorption{};            // on its way, for each unit of length
+    uint32_t not_lit_by = 0;     // sets of receivers that the surface it left is not in
   };
   State state;
   bool straight = false;  // it has just gone so
@@ -30,8 +31,8 @@ struct ChainRay {
 std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uint32_t pixel, Rng rng,
                                     const ChainRay::State& state);
 
-// Follows the rays to their ends. Lights with an area are seen in mirrors, though not by the camera itself.
+// Follows the rays to their ends; `direct`: to what shines at the first. Lights with an area are seen in mirrors, though not by the camera itself.
 void follow_chains(const Scene& scene, const LightSurfaces& light_surfaces, std::vector<ChainRay> rays,
-                   const Progress& progress, TracedPoints& hits, Counters& counters);
+                   const Progress& progress, TracedPoints& hits, Counters& counters, bool direct = false);
 
 }  // namespace lumicut

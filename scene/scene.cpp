@@ -211,15 +211,16 @@ void Scene::set_trace(AccelFactory factory) {
 }
 
 void Scene::check_references() const {
-  const auto check_texture = [&](int32_t index, size_t material, const char* field, bool by_view = false) {
+  const auto check_texture = [&](int32_t index, size_t material, const char* field, bool by_view = false,
+                                 const char* owner = "material") {
     if (index >= 0 && static_cast<size_t>(index) >= textures_.size())
-      fail_argument(at("material", material) + "." + field + " = " + std::to_string(index) +
+      fail_argument(at(owner, material) + "." + field + " = " + std::to_string(index) +
                     " is out of range: the scene has " + std::to_string(textures_.size()) + " textures");
     if (index < 0) return;
     if (const TextureProgram* program = textures_[index].program())
       return program->check_textures(textures_, at("texture", static_cast<size_t>(index)) + ".program: ");
     if (textures_[index].is_by_view() && !by_view)
-      fail_argument(at("material", material) + "." + field + " = " + std::to_string(index) +
+      fail_argument(at(owner, material) + "." + field + " = " + std::to_string(index) +
                     " is a texture by view, which this field cannot have");
   };
   for (size_t i = 0; i < materials_.size(); ++i) {
@@ -244,6 +245,12 @@ void Scene::check_references() const {
     if (lights_[i].profile != 0 && profiles_.find(lights_[i].profile) == nullptr)
       fail_argument(at("light", i) + ".profile = " + std::to_string(lights_[i].profile) +
                     " is none of the scene's profiles");
+  for (size_t i = 0; i < lights_.size(); ++i) {
+    check_texture(lights_[i].texture, i, "texture", false, "light");
+    if (lights_[i].texture >= 0 && textures_[lights_[i].texture].program() != nullptr)
+      fail_argument(at("light", i) + ".texture = " + std::to_string(lights_[i].texture) +
+                    " is a program, which surfaces alone can have");
+  }
   if (environment_.texture >= 0 && static_cast<size_t>(environment_.texture) >= textures_.size())
     fail_argument("environment.texture = " + std::to_string(environment_.texture) + " is out of range: the scene has " +
                   std::to_string(textures_.size()) + " textures");
@@ -290,7 +297,7 @@ void Scene::commit(Progress& progress) {
     if (mesh.triangle_materials.empty() && mesh.triangle_count() > 0) meet(materials_[mesh.material]);
     for (uint32_t material : mesh.triangle_materials) meet(materials_[material]);
     geometry.meshes.push_back({mesh.positions.data(), mesh.positions.size(), mesh.indices.data(), mesh.triangle_count(),
-                               mesh.mask, cutout, passes_light});
+                               mesh.ray_mask(), cutout, passes_light});
     if (absorbs) thickness[m] = thickness_of(mesh, materials_);
     first_instance.push_back(static_cast<uint32_t>(geometry.instances.size()));
     for (uint32_t i = 0; i < instance_count(m); ++i) {
@@ -534,7 +541,8 @@ Vec3f Scene::mapped_normal(const Material& material, const SurfaceHit& hit, cons
 }
 
 SurfaceInteraction Scene::interaction(const SurfaceHit& hit, const Vec3f& to_viewer, uint32_t pixel) const {
-  const SurfaceView view{hit.position, hit.geometric_normal, hit.normal, to_viewer, hit.offset, pixel, hit.smooth};
+  const SurfaceView view{hit.position, hit.geometric_normal,        hit.normal, to_viewer, hit.offset, pixel,
+                         hit.smooth,   meshes_[hit.mesh].not_lit_by};
   return {hit, emitted(hit, to_viewer), bsdf_parameters(hit.material, hit.uv, view, &hit), view};
 }
 
@@ -574,6 +582,14 @@ BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv, const Surface
 
 bool Scene::may_be_specular() const {
   return std::any_of(materials_.begin(), materials_.end(), [](const Material& m) { return m.may_be_specular(); });
+}
+
+Rgb Scene::light_value(const Light& light, const Vec3f& at) const {
+  if (light.texture < 0) return light.value;
+  const Vec3f d = at - light.position;
+  return light.value * max(textures_[light.texture].color(0.5f + dot(d, light.u) / length2(light.u),
+                                                          0.5f + dot(d, light.v) / length2(light.v)),
+                           Rgb{});
 }
 
 Rgb Scene::emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const {

@@ -126,6 +126,8 @@ class Scene final : private HitFilter {
   size_t most_layers() const { return most_layers_; }
   // Whether any material may have a specular lobe.
   bool may_be_specular() const;
+  // Of a rectangle or disk at a place on it: its value, and its texture there.
+  Rgb light_value(const Light& light, const Vec3f& at) const;
   // Radiance emitted by a surface towards `to_viewer`.
   Rgb emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const;
   // About the mean of that over the side that `normal` points to, where the view makes a difference.

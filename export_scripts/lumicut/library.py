@@ -30,10 +30,10 @@ EQUIRECTANGULAR, FISHEYE_EQUIDISTANT, FISHEYE_EQUISOLID = 1, 2, 3  # of Camera.p
 BOX, GAUSSIAN, BLACKMAN_HARRIS = range(3)  # of RenderDesc.filter
 RADIOMETRIC, WATT = 0, 1
 HIDDEN = 1  # of Environment.flags
-CAMERA_RAYS, DIFFUSE_RAYS, GLOSSY_RAYS, TRANSMISSION_RAYS, SHADOW_RAYS = 1, 2, 4, 8, 16  # of Mesh.mask
+CAMERA_RAYS, DIFFUSE_RAYS, GLOSSY_RAYS, TRANSMISSION_RAYS, SHADOW_RAYS = 1, 2, 4, 8, 16  # of Mesh.mask, Light.mask, Environment.mask
 RAYS = {"camera": CAMERA_RAYS, "diffuse": DIFFUSE_RAYS, "glossy": GLOSSY_RAYS, "transmission": TRANSMISSION_RAYS, "shadow": SHADOW_RAYS}
 ALL_RAYS = sum(RAYS.values())
-CHECKPOINTS, ILLUMINANCE, GROUPS, DENOISE, KEEP_FIREFLIES = 1, 2, 4, 8, 16  # of RenderDesc.flags
+CHECKPOINTS, ILLUMINANCE, GROUPS, DENOISE, KEEP_FIREFLIES, DIRECT = 1, 2, 4, 8, 16, 32  # of RenderDesc.flags
 VIRTUAL_LIGHTS, LIGHT_GROUPS, COMPENSATION, SAVED_STATE, VIEW_INDEPENDENT, ALL_LIGHTS = 1, 2, 4, 8, 16, 32  # traits
 SOURCE_PATH, SOURCE_POINT, SOURCE_AREA = range(3)  # of VplOrigin.source
 VPL_OMNI, VPL_ORIENTED, VPL_DIRECTIONAL, VPL_SPOT, VPL_SPHERE = range(5)
@@ -173,7 +173,8 @@ class Mesh(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("mask", c_uint32), ("positions", c_void_p), ("normals", c_void_p),
                 ("uvs", c_void_p), ("vertex_count", c_uint64), ("indices", c_void_p), ("triangle_count", c_uint64),
                 ("materials", c_void_p), ("transforms", c_void_p), ("transform_count", c_uint64),
-                ("material", c_uint32), ("group", c_uint32), ("attributes", c_void_p), ("attribute_count", c_uint64)]
+                ("material", c_uint32), ("group", c_uint32), ("attributes", c_void_p), ("attribute_count", c_uint64),
+                ("not_lit_by", c_uint32), ("not_blocking", c_uint32), ("receivers", c_uint32), ("blockers", c_uint32)]
 
 
 class Light(Descriptor):
@@ -181,7 +182,8 @@ class Light(Descriptor):
                 ("color", c_float * 3), ("value", c_float), ("position", c_float * 3), ("radius", c_float),
                 ("direction", c_float * 3), ("angle", c_float), ("u", c_float * 3), ("blend", c_float),
                 ("v", c_float * 3), ("spread", c_float), ("spot_cosine", c_uint32), ("profile", c_uint32),
-                ("tangent", c_float * 3), ("flags", c_uint32)]
+                ("tangent", c_float * 3), ("flags", c_uint32), ("mask", c_uint32), ("receivers", c_uint32),
+                ("blockers", c_uint32), ("texture", c_int32)]
 
 
 class Profile(Descriptor):
@@ -191,7 +193,7 @@ class Profile(Descriptor):
 
 class Environment(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("group", c_uint32), ("color", c_float * 3), ("texture", c_int32),
-                ("world_to_map", c_float * 9), ("flags", c_uint32)]
+                ("world_to_map", c_float * 9), ("flags", c_uint32), ("mask", c_uint32)]
 
 
 class Camera(Descriptor):
@@ -219,7 +221,8 @@ class RenderDesc(Descriptor):
     _fields_ = [("struct_size", c_uint32), ("width", c_uint32), ("height", c_uint32), ("samples", c_uint32),
                 ("crop", c_uint32 * 4), ("tile_size", c_uint32), ("passes", c_uint32), ("max_seconds", c_float),
                 ("target_error", c_float), ("confidence", c_float), ("flags", c_uint32), ("checkpoint", c_void_p),
-                ("checkpoint_size", c_uint64), ("filter", c_uint32), ("filter_width", c_float)]
+                ("checkpoint_size", c_uint64), ("filter", c_uint32), ("filter_width", c_float),
+                ("lobes", c_uint32), ("occlusion", c_float)]
 
 
 class Tile(Descriptor):
@@ -279,8 +282,8 @@ VPL, VPL_ORIGIN, POINT_TO_SHADE, RAY, RAYHIT, FIRST_HIT = map(np.dtype, (Vpl, Vp
 
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
 SIZES = {Ray: 48, Hit: 32, Rayhit: 80, Vpl: 64, Point: 64, DeviceDesc: 32, Status: 64, AccelDesc: 80, AccelInfo: 80,
-         AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 40, Material: 164, Mesh: 104, Light: 120, Profile: 40,
-         Environment: 64, Camera: 128, IntegratorInfo: 88, ParamInfo: 72, RenderDesc: 80, Tile: 20, ChannelInfo: 24}
+         AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 40, Material: 164, Mesh: 120, Light: 136, Profile: 40,
+         Environment: 68, Camera: 128, IntegratorInfo: 88, ParamInfo: 72, RenderDesc: 88, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32
 HANDLE = c_void_p
@@ -600,8 +603,9 @@ class Scene(Handle):
         self._call("scene_set_profiles", *_array(Profile, items))
 
     def add_mesh(self, positions, indices, normals=None, uvs=None, materials=None, material=0, transforms=None, group=0, mask=0,
-                 attributes=()):
-        """`attributes`: (id, domain, values) each, a row of `values` for each place."""
+                 attributes=(), links=(0, 0, 0, 0)):
+        """`attributes`: (id, domain, values) each, a row of `values` for each place. `links`: Mesh.not_lit_by, not_blocking,
+        receivers, blockers."""
         positions, normals = _rows("positions", positions, np.float32, 3), _rows("normals", normals, np.float32, 3)
         uvs, transforms = _rows("uvs", uvs, np.float32, 2), _rows("transforms", transforms, np.float32, 12)
         indices, materials = _rows("indices", indices, np.uint32, 3), _rows("materials", materials, np.uint32, 1)
@@ -628,6 +632,7 @@ class Scene(Handle):
                     materials=address(materials), material=material, transforms=address(transforms),
                     transform_count=0 if transforms is None else len(transforms), group=group, mask=mask,
                     attributes=ctypes.addressof(described) if arrays else None, attribute_count=len(arrays))
+        mesh.not_lit_by, mesh.not_blocking, mesh.receivers, mesh.blockers = links
         self._call("scene_add_mesh", ctypes.byref(mesh), ctypes.byref(c_uint32()))
 
     def set_environment(self, environment):
@@ -758,14 +763,16 @@ def _fill(rays, origins, directions, near, far):
 class Render(Handle):
     """A frame that renders in the background. Tiles and crop count rows from the top.
 
-    `passes`, `max_seconds`, `target_error`, `confidence`, `flags` and filter as in lumicut_render_desc."""
+    `passes`, `max_seconds`, `target_error`, `confidence`, `flags`, filter, `lobes` and
+    `occlusion` as in lumicut_render_desc."""
 
     def __init__(self, integrator, scene, width, height, samples=1, crop=None, tile_size=0, passes=1, max_seconds=0.0,
-                 target_error=0.0, confidence=0.0, flags=0, pixel_filter=BOX, filter_width=0.0):
+                 target_error=0.0, confidence=0.0, flags=0, pixel_filter=BOX, filter_width=0.0, lobes=0, occlusion=0.0):
         super().__init__(integrator.library)
         self.crop = tuple(crop) if crop else (0, 0, width, height)
         desc = RenderDesc(width=width, height=height, samples=samples, tile_size=tile_size, passes=passes,
-                          max_seconds=max_seconds, target_error=target_error, confidence=confidence, flags=flags, filter=pixel_filter, filter_width=filter_width)
+                          max_seconds=max_seconds, target_error=target_error, confidence=confidence, flags=flags, filter=pixel_filter,
+                          filter_width=filter_width, lobes=lobes, occlusion=occlusion)
         desc.crop[:] = self.crop
         self.components = self.library.channels()
         self._create("render_start", integrator.pointer, scene.pointer, ctypes.byref(desc))

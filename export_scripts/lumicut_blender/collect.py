@@ -7,13 +7,15 @@ each set of materials; its instances are transforms.
 import bpy
 import numpy as np
 
-from . import lights, mesh_attributes, strands, worlds
+from . import lights, linking, mesh_attributes, program_values, programs, strands, worlds
 from .lumicut import library
 from .cameras import rows
 from .materials import Materials
 from .report import Report
 from .scene_data import Mesh, Owner, SceneData, flattened, is_flat
 
+LIT_RAYS = ("diffuse", "glossy", "transmission")  # kinds that lamps and worlds are hidden from
+LIT = sum(library.RAYS[ray] for ray in LIT_RAYS)
 AS_MESH = {"CURVE", "FONT", "META", "SURFACE"}  # a MESH item follows for each
 LEFT_OUT = {"VOLUME": "Volumes left out", "GPENCIL": "Grease pencil left out", "GREASEPENCIL": "Grease pencil left out"}
 
@@ -70,9 +72,10 @@ def normals_of(mesh, corners):
 class MeshReader:
     """One evaluated mesh to arrays. `numbers`: the materials of its slots, in order. `check` raises to stop."""
 
-    def __init__(self, name, mesh, numbers, materials, report, check=lambda: None):
+    def __init__(self, name, mesh, numbers, materials, report, check=lambda: None, displacements=(), instance=None):
+        """`displacements`: of each slot, Materials.displacements or None; `instance`: where they are looked up."""
         self.name, self.mesh, self.numbers, self.materials, self.report = name, mesh, numbers, materials, report
-        self.check = check
+        self.check, self.displacements, self.instance = check, displacements, instance
 
     def read(self):
         """scene_data.Mesh without instances, or None for one without faces."""
@@ -103,6 +106,9 @@ class MeshReader:
         self.check()
         attributes = self._attributes(loops, used)
         self.check()
+        if any(self.displacements):
+            positions, normals = self._displaced(corners, tri_corners, slot_of_triangle, positions, kind, normals, loops)
+            out.positions = positions
         bad = ~np.isfinite(positions).all(1)
         if bad.any():
             self.report.note(self.name, "Vertices that are not finite, moved to the origin")
@@ -119,6 +125,61 @@ class MeshReader:
             out.attributes = [(number, library.OF_VERTICES, values[corners] if domain == "vertex" else values)
                               for number, domain, values in attributes]
         return out
+
+    def _displaced(self, corners, tri_corners, slot_of_triangle, positions, kind, normals, loops):
+        """Positions moved along their normals by the materials' heights, and the normals of that shape."""
+        mesh, to_world = self.mesh, np.array(self.instance.matrix_world, np.float64)
+        triangles = corners[tri_corners]
+        of_vertices = fetch(mesh.vertices, "normal", len(positions), 3, np.float32)
+        places = (positions @ to_world[:3, :3].T + to_world[:3, 3]).astype(np.float32)
+        facing = of_vertices @ np.linalg.inv(to_world[:3, :3])
+        facing = (facing / np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-30)).astype(np.float32)
+        reader = mesh_attributes.AttributeReader(mesh, fetch, lambda text: self.report.note(self.name, text), self.check)
+        moved = positions.astype(np.float64)
+        for slot, displacement in enumerate(self.displacements):
+            at = np.unique(triangles if slot_of_triangle is None else triangles[slot_of_triangle == slot])
+            if displacement is None or not len(at):
+                continue
+            height, of_world = displacement
+            attributes = {}
+            for name in dict.fromkeys(programs.program_of("height", height).attributes()) if not height.constant() else ():
+                self.check()
+                if name[0] in {"world_to_object", "object_to_world"}:
+                    continue
+                if name[0] in mesh_attributes.OF_INSTANCE:
+                    attributes[name] = np.tile(mesh_attributes.of_instance(name, self.instance), (len(at), 1))
+                elif (read := reader.read(name, self._layer, loops)) is not None:
+                    domain, values = read
+                    if domain == "corner":  # one of a vertex's, as Cycles takes one
+                        of_corner = np.zeros((len(positions), values.shape[1]), np.float32)
+                        of_corner[corners[::-1]] = values[::-1]
+                        values = of_corner
+                    attributes[name] = values[at]
+            heights = program_values.numbers_at(height, places[at], facing[at], attributes, to_world).astype(np.float64)[:, None]
+            step = of_vertices[at] * heights
+            if of_world:
+                step = (facing[at] * heights) @ np.linalg.inv(to_world[:3, :3]).T
+            moved[at] += step
+        moved = moved.astype(np.float32)
+        self.check()
+        if kind == "flat":
+            return moved, normals
+        p = moved[triangles].astype(np.float64)
+        across = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-30)
+        smooth = np.zeros((len(moved), 3))
+        for k in range(3):  # by the angle of each corner
+            a, b = p[:, (k + 1) % 3] - p[:, k], p[:, (k + 2) % 3] - p[:, k]
+            cosine = (a * b).sum(1) / np.maximum(np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1), 1e-30)
+            np.add.at(smooth, triangles[:, k], across * np.arccos(np.clip(cosine, -1, 1))[:, None])
+        smooth = (smooth / np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1e-30)).astype(np.float32)
+        if kind == "vertex":
+            return moved, smooth
+        flat = np.zeros((loops, 3), np.float32)
+        flat[tri_corners.ravel()] = np.repeat(across, 3, 0)
+        was_flat = fetch(mesh.polygons, "use_smooth", len(mesh.polygons), 1, bool)
+        counts = fetch(mesh.polygons, "loop_total", len(mesh.polygons), 1, np.int32)
+        return moved, np.where(np.repeat(~was_flat, counts)[:, None], flat, smooth[corners])
 
     def _attributes(self, loops, used):
         """(number, "vertex" or "corner", values) of all that the programs of its materials ask for and that the mesh has."""
@@ -226,6 +287,7 @@ class Collector:
         self._looked_at = set()
         self._sheets = {}  # by mesh: whether it is open, and its extents
         self.instances = 0
+        self.linking = linking.Linking(depsgraph, self.report)
         # Light groups by name: 0 holds all that is in none.
         names = getattr(depsgraph.view_layer_eval, "lightgroups", ())
         self.groups = {group.name: 1 + i for i, group in enumerate(names)}
@@ -251,18 +313,13 @@ class Collector:
                 if layer.use_solid:
                     self._add_points(instance, ob, override)
             elif ob.type == "LIGHT":
-                light = lights.convert_light(ob.name, ob.data, instance.matrix_world, self.materials.images, self.report,
-                                             self.profiles)
-                if light is not None:
+                for light in lights.convert_light(ob.name, ob.data, instance.matrix_world, self.materials.images, self.report,
+                                                  self.profiles, self.materials.picture_number):
                     light.group = self._group(ob)
+                    self._limit_light(ob, light)
                     self.scene.lights.append((ob.name, light))
                     if not ob.is_shadow_catcher:
                         self.scene.added_lamps.add(ob.name)
-                if not all(getattr(ob, "visible_" + ray) for ray in ("diffuse", "glossy", "transmission")):
-                    self.report.note(ob.name, "Lamps hidden from some rays, which light all here")
-                self._check_linking(ob)
-                if ob.visible_camera:
-                    self.report.note(ob.name, "Lamps that the camera should see, which it does not")
             elif ob.type in LEFT_OUT:
                 self.report.note(ob.name, LEFT_OUT[ob.type])
         self.check()
@@ -284,8 +341,12 @@ class Collector:
         hidden = seen is not None and not seen.camera
         if hidden:
             self.scene.backdrop = None
-        if seen is not None and not all(getattr(seen, ray) for ray in ("diffuse", "glossy", "transmission")):
-            self.report.note(world.name, "Worlds hidden from some rays, which all see here")
+        mask = sum(library.RAYS[ray] for ray in LIT_RAYS if seen is None or getattr(seen, ray))
+        if mask != LIT:
+            for light in suns:
+                light[1].mask = mask | library.SHADOW_RAYS
+            if self.scene.environment is not None:
+                self.scene.environment.mask = mask | library.CAMERA_RAYS
         if self.scene.environment is not None and (self.scene.transparent or backdrop is not None or hidden):
             self.scene.environment.flags |= library.HIDDEN
         if scene.render.use_motion_blur:
@@ -383,11 +444,12 @@ class Collector:
             number, group = numbers[0], self._group_of_light(ob, numbers)
             if self.materials.converted[number].is_hole():
                 continue
-            made = key, number, group, mask, ob.is_shadow_catcher
+            links = self.linking.of(ob)
+            made = key, number, group, mask, ob.is_shadow_catcher, links
             if made not in self._shapes:
                 self.check()
                 self._shapes[made] = [Mesh(name, positions, indices, normals, uvs, None, number, [], group, mask,
-                                           catcher=ob.is_shadow_catcher)
+                                           catcher=ob.is_shadow_catcher, links=links)
                                       for positions, normals, indices, uvs
                                       in shape(bool(self.materials.converted[number].plain_pictures())) if len(indices)]
             for mesh in self._shapes[made]:
@@ -406,11 +468,12 @@ class Collector:
             number, group = numbers[0], self._group_of_light(ob, numbers)
             if self.materials.converted[number].is_hole():
                 continue
-            made = "sphere", number, group, mask, ob.is_shadow_catcher
+            links = self.linking.of(ob)
+            made = "sphere", number, group, mask, ob.is_shadow_catcher, links
             if made not in self._shapes:
                 positions, indices = strands.unit_sphere()
                 self._shapes[made] = [Mesh("spheres of points", positions, indices, positions, None, None, number, [], group, mask,
-                                           catcher=ob.is_shadow_catcher)]
+                                           catcher=ob.is_shadow_catcher, links=links)]
             self._shapes[made][0].transforms += transforms
             self._own(self._shapes[made][0], ob, len(transforms))
             self.instances += len(transforms)
@@ -418,12 +481,13 @@ class Collector:
     def _add_variant(self, instance, ob, mesh, slots, numbers, mask):
         """`numbers`: materials by slot; `mask`: of the rays that see them."""
         group = self._group_of_light(ob, numbers)
-        key = (mesh.as_pointer(), numbers, group, mask, ob.is_shadow_catcher)
+        links = self.linking.of(ob)
+        key = (mesh.as_pointer(), numbers, group, mask, ob.is_shadow_catcher, links)
         if key not in self._meshes:
             self.check()
-            found = self._read(ob, mesh, slots, numbers)
+            found = self._read(ob, mesh, slots, numbers, instance)
             if found is not None:
-                found.group, found.mask, found.catcher = group, mask, ob.is_shadow_catcher
+                found.group, found.mask, found.catcher, found.links = group, mask, ob.is_shadow_catcher, links
                 if all(self.materials.converted[n].is_hole() for n in found.numbers()):
                     found = None
             self._meshes[key] = found
@@ -478,22 +542,32 @@ class Collector:
             hidden.add("camera")
         return hidden
 
-    def _check_linking(self, ob):
-        linking = getattr(ob, "light_linking", None)  # 4.0 and later
-        if linking is not None and (linking.receiver_collection or linking.blocker_collection):
-            self.report.note(ob.name, "Light and shadow linking left out")
+    def _limit_light(self, ob, light):
+        """A lamp's ray visibility, and what it is linked to."""
+        mask = sum(library.RAYS[ray] for ray in LIT_RAYS if getattr(ob, "visible_" + ray))
+        if ob.visible_camera:
+            if light.type in {library.RECTANGLE, library.DISK} or (light.type != library.SUN and light.radius > 0):
+                mask |= library.CAMERA_RAYS
+            elif light.type == library.SUN and light.radius > 0:
+                self.report.note(ob.name, "Suns that the camera should see, which it does not")
+        light.mask = 0 if mask == LIT else mask or library.SHADOW_RAYS
+        links = self.linking.of(ob)
+        light.receivers, light.blockers = links.receivers, links.blockers
 
     def _check_flags(self, ob):
-        self._check_linking(ob)
         if ob.is_shadow_catcher and self.depsgraph.mode == "VIEWPORT":
             self.report.note(ob.name, "Shadow catchers taken as ordinary objects in the viewport")
         of_cycles = getattr(self.depsgraph.scene, "cycles", None)
         if getattr(of_cycles, "feature_set", "") == "EXPERIMENTAL" and getattr(getattr(ob, "cycles", None), "use_adaptive_subdivision", False):
             self.report.note(ob.name, "Adaptive subdivision, taken as the modifier's levels")
 
-    def _read(self, ob, mesh, slots, numbers):
-        if self.cache is None:
-            return self._convert(ob, mesh, numbers)
+    def _displacements(self, slots):
+        return [None if material is None else self.materials.displacements.get(material.name_full) for material in slots]
+
+    def _read(self, ob, mesh, slots, numbers, instance):
+        displacements = self._displacements(slots)
+        if self.cache is None or any(displacements):
+            return self._convert(ob, mesh, numbers, displacements, instance)
         # Evaluated data move in memory; the originals' names say what they came from.
         converted = [self.materials.converted[n] for n in numbers]
         mappings = (tuple(c.mapping if c.plain_pictures() else None for c in converted),
@@ -502,19 +576,19 @@ class Collector:
         key = (mesh.as_pointer(), mappings, names, tuple(numbers), len(mesh.vertices), len(mesh.loops))
         found = self.cache.meshes.get(key)
         if found is None:
-            found = self._convert(ob, mesh, numbers)
+            found = self._convert(ob, mesh, numbers, displacements, instance)
             if found is None:
                 return None
             self.cache.meshes[key] = found
         return Mesh(found.name, found.positions, found.indices, found.normals, found.uvs, found.materials, found.material, [],
                     attributes=found.attributes)
 
-    def _convert(self, ob, mesh, numbers):
+    def _convert(self, ob, mesh, numbers, displacements, instance):
         edited = mesh.is_editmode  # its faces are with the editor, the mesh is empty
         if edited:
             mesh = ob.to_mesh(preserve_all_data_layers=True, depsgraph=self.depsgraph)
         try:
-            reader = MeshReader(ob.name, mesh, numbers, self.materials, self.report, self.check)
+            reader = MeshReader(ob.name, mesh, numbers, self.materials, self.report, self.check, displacements, instance)
             found = reader.read()
             if self.uv_maps and found is not None and mesh.uv_layers:
                 found.uv_map = reader.uv_map()

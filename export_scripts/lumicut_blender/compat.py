@@ -12,7 +12,10 @@ except ImportError:  # private to Blender's own panels: may move
             layout.template_node_view(tree, output, output.inputs[input_name])
 
 # Blender 5.0 has these passes by longer names.
-LONG_PASS_NAMES = {"IndexOB": "Object Index", "IndexMA": "Material Index", "Emit": "Emission", "Env": "Environment"}
+LONG_PASS_NAMES = {"IndexOB": "Object Index", "IndexMA": "Material Index", "Emit": "Emission", "Env": "Environment",
+                   "AO": "Ambient Occlusion"}
+LONG_PASS_NAMES |= {short + what: f"{long} {means}" for short, long in (("Diff", "Diffuse"), ("Gloss", "Glossy"), ("Trans", "Transmission"))
+                    for what, means in (("Dir", "Direct"), ("Ind", "Indirect"), ("Col", "Color"))}
 
 
 def pass_name(short):

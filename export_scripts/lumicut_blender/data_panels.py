@@ -140,11 +140,11 @@ class LUMICUT_PT_ray_visibility(Panel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and context.object.type in GEOMETRY
+        return super().poll(context) and context.object.type in GEOMETRY | {"LIGHT"}
 
     def draw(self, context):
         column = split(self.layout).column()
-        for ray in ("camera", "diffuse", "glossy", "transmission", "shadow"):
+        for ray in ("camera", "diffuse", "glossy", "transmission", "shadow")[:4 if context.object.type == "LIGHT" else 5]:
             column.prop(context.object, "visible_" + ray, text=ray.capitalize())
 
 
@@ -161,7 +161,7 @@ class LUMICUT_PT_world_ray_visibility(Panel, bpy.types.Panel):
     bl_context = "world"
     bl_options = {"DEFAULT_CLOSED"}
     owner = "world"
-    rays = ("camera",)  # that are followed
+    rays = ("camera", "diffuse", "glossy", "transmission")
 
     @classmethod
     def poll(cls, context):

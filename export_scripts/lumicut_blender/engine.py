@@ -183,6 +183,10 @@ class LumicutEngine(bpy.types.RenderEngine):
                         frame = self._frame_beside(watched, name, beside, integrator_name, parameters, samples,
                                                    finished.passes_done, width, height, crop)
                         self._passes[name] = passes.of_frame(name, layer, frame, passes.exposure(scene))
+                    if not self.is_preview:
+                        self._passes |= passes.of_lobes(layer, scene, lambda name, **more: self._frame_beside(
+                            watched, name, target, integrator_name, parameters, samples, finished.passes_done, width, height, crop,
+                            **more), passes.exposure(scene))
                     if of_hits is not None:
                         self.say("passes of hits")
                         frame = library.RenderDesc(width=width, height=height, samples=samples, passes=self._options["passes"],
@@ -249,18 +253,24 @@ class LumicutEngine(bpy.types.RenderEngine):
             self._notes, self._told = (frame, Report()), set()
         return self._notes[1]
 
-    def _frame_beside(self, watched, name, scene, integrator_name, parameters, samples, passes_done, width, height, crop):
-        """{channel: pixels} of another scene, rendered as the whole one was [shadow_catcher.py]."""
-        scene.set_camera(self._view[1])
-        watched.run(scene, "acceleration structure", scene.commit)
-        flags = self._options["flags"] & (library.DENOISE | library.KEEP_FIREFLIES)
+    def _frame_beside(self, watched, name, scene, integrator_name, parameters, samples, passes_done, width, height, crop,
+                      flags=0, **more):
+        """{channel: pixels} of another scene, rendered as the whole one was [shadow_catcher.py]; or of the same one, with
+        `more` of what lumicut_render_desc has."""
+        if not flags and not more:
+            scene.set_camera(self._view[1])
+            watched.run(scene, "acceleration structure", scene.commit)
+            flags = self._options["flags"] & (library.DENOISE | library.KEEP_FIREFLIES)
+        if more.get("occlusion"):  # by no light
+            parameters = parameters | {name: "1" for name in ("vpls", "samples") if name in parameters}
         with library.Integrator(scene.device, integrator_name) as integrator:
             for parameter, value in parameters.items():
                 integrator.set(parameter, value)
             with library.Render(integrator, scene, width, height, samples, crop, self._tile_size(crop), passes=max(1, passes_done),
-                                flags=flags, **{name: self._options[name] for name in ("pixel_filter", "filter_width")}) as render:
+                                flags=flags, **{name: self._options[name] for name in ("pixel_filter", "filter_width")}, **more) as render:
                 self._poll(render, f"beside: {name}", lambda: None)
-                return {channel: render.read(channel) for channel in ("radiance", "alpha", *(["denoised"] if self._denoised else []))}
+                return {channel: render.read(channel)
+                        for channel in ("radiance", "alpha", *(["denoised"] if flags & library.DENOISE else []), *(["albedo"] if more else []))}
 
     def _follow(self, render, depsgraph, crop, height, groups, show_tiles):
         """Polls until the frame is done; hands tiles over as they finish. The library's last status."""

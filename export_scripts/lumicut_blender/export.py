@@ -112,6 +112,19 @@ def rotation_of(light):
     return degrees(math.atan2(tangent @ np.cross(zero, axis), tangent @ zero))
 
 
+def hidden_from(mask):
+    return [ray for ray, bit in library.RAYS.items() if not mask & bit]
+
+
+def links(of_mesh):
+    """Light linking, as scene files have it."""
+    out = {}
+    for key, bits in zip(("not_lit_by", "not_blocking"), of_mesh):
+        if bits:
+            out[key] = [1 + i for i in range(32) if bits >> i & 1]
+    return out | {key: number for key, number in zip(("receivers", "blockers"), of_mesh[2:]) if number}
+
+
 def obj(mesh, mtl, material_names):
     """Text of an OBJ: as many vertices, normals and texture coordinates as the mesh has, in its order."""
     def lines(key, array):
@@ -279,6 +292,9 @@ class Writer:
             out["group"] = light.group
         if light.flags & library.NO_SHADOWS:
             out["shadows"] = False
+        if light.mask:
+            out["hidden_from"] = hidden_from(light.mask | library.SHADOW_RAYS)
+        out |= {key: getattr(light, key) for key in ("receivers", "blockers") if getattr(light, key)}
         if kind != "sun":
             out["position"] = numbers(light.position)
         if kind in ("point", "spot"):
@@ -295,6 +311,8 @@ class Writer:
             out["angular_radius"] = degrees(light.radius)
         if kind in ("rectangle", "disk"):
             out |= {"u": numbers(light.u), "v": numbers(light.v), "spread": min(180.0, degrees(light.spread or math.pi))}
+            if light.texture:
+                out["texture"] = self.image(light.texture, "radiance")
         return out
 
     @staticmethod
@@ -327,6 +345,8 @@ class Writer:
             out |= {"image": self.image(e.texture, "radiance"), "world_to_map": numbers(e.world_to_map)}
         if e.flags & library.HIDDEN:
             out["hidden"] = True
+        if e.mask:
+            out["hidden_from"] = hidden_from(e.mask | library.SHADOW_RAYS | library.CAMERA_RAYS)
         if e.group:
             out["group"] = e.group
         return out
@@ -356,7 +376,8 @@ class Writer:
                                   "instances": [numbers(t) for t in mesh.transforms],
                                   **self.attributes(mesh, file),
                                   **({"group": mesh.group} if mesh.group else {}),
-                                  **({"hidden_from": [ray for ray, bit in library.RAYS.items() if not mesh.mask & bit]} if mesh.mask else {})})
+                                  **({"hidden_from": hidden_from(mesh.mask)} if mesh.mask else {}),
+                                  **links(mesh.links)})
         if not out["meshes"]:
             raise ExportError("the scene has no mesh to export")
         return out

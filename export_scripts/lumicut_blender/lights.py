@@ -6,10 +6,12 @@ import os
 import bpy
 import numpy as np
 
-from . import compat, ies
+from . import compat, ies, lamp_textures
+from .ies import PER_CANDELA
 from .lumicut import library
 from .directions import Directions
-from .nodes import Value
+from .nodes import Quiet, Value
+from .programs import CannotCompile, NORMAL, vector_math
 from .scene_data import Profile
 
 MANY_BOUNCES = 32  # of lamps: fewer is a choice that shows
@@ -34,6 +36,7 @@ class LampReader(Directions):
     """A lamp's own nodes. An IES texture counts as `of_ies`, and is kept beside."""
 
     plain = (("TEX_COORD", "Normal"),)
+    base_normal, material_index = NORMAL, 0
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
@@ -51,32 +54,60 @@ class LampReader(Directions):
         return Value(self.of_ies * self.number(node.inputs["Strength"], stack, "IES strength"))
 
 
+class Notes:
+    """A report that is looked at before it is told."""
+
+    def __init__(self):
+        self.found = []
+
+    def note(self, *what):
+        self.found.append(what)
+
+
 def emission_of(light, images, report):
-    """Colour times strength of a lamp's own nodes, 1 where it has none; and its IES texture, (node, rotation) or None."""
+    """Colour times strength of a lamp's own nodes, 1 where it has none; its IES texture, (node, rotation) or None; and what
+    makes a program of the nodes, or None where they are a constant."""
     if not compat.has_nodes(light):
-        return np.ones(3), None
+        return np.ones(3), None, None
+    told, report = report, Notes()
     reader = LampReader(light.name, images, report)
     output = light.node_tree.get_output_node("CYCLES") or light.node_tree.get_output_node("ALL")
     if output is None:
-        return np.ones(3), None
+        return np.ones(3), None, None
     node, _, stack = reader.source(output.inputs["Surface"], ())
     if node is None:
-        return np.zeros(3), None
+        return np.zeros(3), None, None
     if node.type != "EMISSION":
-        report.note(f"{light.name} ({node.bl_label})", "Shaders of lamps taken as plain emission")
-        return np.ones(3), None
+        told.note(f"{light.name} ({node.bl_label})", "Shaders of lamps taken as plain emission")
+        return np.ones(3), None, None
 
     def at(of_ies):
         reader.of_ies = of_ies
         v = reader.multiply(reader.value(node.inputs["Color"], stack), reader.value(node.inputs["Strength"], stack))
         if v.picture is not None:
-            report.note(light.name, "Textures of lamps taken as their mean")
+            reader.note("", "Textures of lamps taken as their mean")
         return v.mean()
 
     v = at(1.0)
     if reader.ies is not None and not (np.allclose(at(2.0), 2 * v) and np.allclose(at(0.5), 0.5 * v)):
         report.note(light.name, "IES textures that nodes bend, taken as they are")
-    return np.maximum(v, 0), reader.ies
+    if report.found and reader.ies is None and light.type != "SUN":
+        def compiled(axes, place):
+            """What the nodes say of each place or direction; None, with the notes, where that is not known."""
+            reader.report = Quiet()
+            compiler = lamp_textures.LampCompiler(reader, light, axes, place)
+            try:
+                return vector_math("MULTIPLY", compiler.socket(node.inputs["Color"], stack),
+                                   compiler.socket(node.inputs["Strength"], stack))
+            except CannotCompile:
+                for note in report.found:
+                    told.note(*note)
+                return None
+
+        return np.maximum(v, 0), None, compiled
+    for note in report.found:
+        told.note(*note)
+    return np.maximum(v, 0), reader.ies, None
 
 
 class Profiles:
@@ -124,6 +155,10 @@ class Profiles:
         if isinstance(table, str):
             self.report.note(f"{name}: {table}", "Lamps whose IES file cannot be read left out")
             return False
+        return self.add_table(name, light, key, table, rotation, matrix, out, "IES files")
+
+    def add_table(self, name, light, key, table, rotation, matrix, out, what):
+        """The same of a table (name, vertical, horizontal, candela) that is told apart by its key."""
         own = np.array(matrix, np.float64)[:3, :3]
         # Looked up with -z as vertical angle 0, -y as horizontal angle 0, and on towards -x: seen from above the other
         # way round than the library's, unless the lamp is mirrored.
@@ -136,10 +171,10 @@ class Profiles:
             vertical, horizontal, candela = _cut_cone(vertical, horizontal, candela, axis, light)
             key += (light.spot_size, light.spot_blend, tuple(axis.round(6)))
             if not candela.any():
-                self.report.note(f"{name}: {source}", "IES files that give nothing within their spot's cone")
+                self.report.note(f"{name}: {source}", f"{what} that give nothing within their spot's cone")
                 return False
         if out.radius > 0:
-            self.report.note(name, "Lamps with IES files, taken as points without a radius")
+            self.report.note(name, f"Lamps with {what}, taken as points without a radius")
         out.radius, out.type, out.flags = 0.0, library.POINT, out.flags & ~library.FACING_DISK
         key += (mirrored,)
         if key not in self._numbers:
@@ -181,9 +216,49 @@ def _cut_cone(vertical, horizontal, candela, axis, light):
     return angles, horizontal, values * falloff
 
 
-def convert_light(name, light, matrix, images, report, profiles):
-    """A library.Light, or None for one that gives nothing."""
-    emission, of_ies = emission_of(light, images, report)
+def convert_light(name, light, matrix, images, report, profiles, picture_number):
+    """[library.Light]: none for one that gives nothing, one of each primary colour for one that throws an image.
+    `picture_number`: of a Picture among the scene's."""
+    emission, of_ies, compiled = emission_of(light, images, report)
+    out = _plain_light(name, light, matrix, emission if compiled is None else np.ones(3), of_ies, report, profiles)
+    if out is None or compiled is None:
+        return [] if out is None else [out]
+    m = np.array(matrix)[:3]
+    expr = compiled(m[:, :3] / np.maximum(np.linalg.norm(m[:, :3], axis=0), 1e-30), m[:, 3])
+    own = np.array(out.color)
+
+    def coloured(colour):
+        out.color[:] = [float(c) for c in own * np.maximum(colour, 0)]
+        return [out] if any(out.color) else []
+
+    if expr is None or expr.constant():
+        return coloured(emission if expr is None else expr.mean)
+    if light.type == "AREA":
+        colour, picture = lamp_textures.over(expr, m[:, 3], np.array(out.u), np.array(out.v), m[:, 1])
+        if picture is not None:
+            out.texture = picture_number(picture)
+        return coloured(colour)
+    vertical, horizontal, values = lamp_textures.around(expr)
+    if vertical is None:
+        return coloured(values)
+    lights = []
+    grey = np.ptp(values, axis=2).max() <= 1e-4 * values.max()
+    for channel in range(1 if grey else 3):
+        part = library.Light.from_buffer_copy(out)
+        part.color[:] = [float(c) if grey or k == channel else 0.0 for k, c in enumerate(own)]
+        table = values[..., channel]
+        key = "nodes", expr.key, channel
+        if not (table > 0).any() or not any(part.color):
+            continue
+        if profiles.add_table(name, light, key, (name, vertical, horizontal, table / PER_CANDELA), np.eye(3), matrix, part,
+                              "textures by direction"):
+            part.angle, part.blend, part.spot_cosine = 0.0, 0.0, 0
+            lights.append(part)
+    return lights
+
+
+def _plain_light(name, light, matrix, emission, of_ies, report, profiles):
+    """A library.Light, or None."""
     colour = np.array(light.color, np.float64) * emission
     # 4.5 and later: exposure in stops, and a temperature that colours.
     value = light.energy * 2.0 ** getattr(light, "exposure", 0.0)

@@ -15,7 +15,7 @@ from .lumicut import library
 from .images import Images, Picture, image_of
 from .mappings import Mapping, aligned
 from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Value, input_of
-from .programs import NORMAL, CannotCompile, Compiler, ProgramPicture, of_picture, program_of
+from .programs import NORMAL, CannotCompile, Compiler, ProgramPicture, of_picture, program_of, bump_of
 
 HOLE = 1e-3  # an opacity that the library takes as "not there"; 0 means 1 to it
 LARGEST_FACTOR = 1e6  # of a texture, in the library
@@ -506,6 +506,7 @@ class Materials:
         self.converted, self.pictures = [], []
         self.aspect, self.aov = 1.0, None
         self._attributes = {}
+        self.displacements = {}  # (height, whether in the world's units) by the full name of materials that move vertices
         self._numbers, self._picture_numbers = {}, {}
 
     def held_out(self, number):
@@ -735,17 +736,18 @@ class Materials:
         grey = (picture.linear() @ LUMINANCE)[..., None]
         return Picture(picture.name + " mask", (picture.key, "mask"), picture.mapping, picture.flags, linear=grey)
 
-    @staticmethod
-    def _displace(reader, material, socket):
-        """Displacement as a bump beneath the material's own normals."""
+    def _displace(self, reader, material, socket):
+        """Displacement as a bump beneath the material's own normals, of vertices, or both."""
+        # A material's own since 4.1.
+        method = getattr(material, "displacement_method", None) or getattr(getattr(material, "cycles", None), "displacement_method", "BUMP")
         try:
-            reader.base_normal = reader.compiler.displacement(socket) or NORMAL
+            height = reader.compiler.height(socket)
+            if height is not None and method != "BUMP":
+                self.displacements[material.name_full] = height
+            if height is not None and method != "DISPLACEMENT" and not height[0].constant():
+                reader.base_normal = bump_of(height[0], moved=method == "BOTH")
         except CannotCompile as what:
             reader.note(str(what), "Displacement left out")
-            return
-        settings = getattr(material, "cycles", material)
-        if getattr(settings, "displacement_method", "BUMP") != "BUMP" and reader.base_normal is not NORMAL:
-            reader.note("", "Displacement taken as a bump map")
 
     def _surface(self, material, name, ray):
         if self.aov is None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What texture programs ask of meshes and objects: coordinates, colour and other attributes, random numbers.
 
-An attribute is named by a tuple: ("uv", map), ("layer", name), ("generated",), ("island",) are of meshes; ("object", output),
+An attribute is named by a tuple: ("uv", map), ("layer", name), ("generated",), ("undisplaced",), ("island",) are of meshes; ("object", output),
 ("property", name), ("world_to_object",) and ("object_to_world",) of instances.
 """
 import numpy as np
@@ -111,6 +111,8 @@ class AttributeReader:
             return "corner", layer(name[1], loops)
         if kind == "generated":
             return "vertex", self.generated()
+        if kind == "undisplaced":
+            return "vertex", self.fetch(self.mesh.vertices, "co", len(self.mesh.vertices), 3, np.float32)
         if kind == "island":
             return "vertex", self.island()
         return self.layer(name[1], layer, loops)

@@ -281,6 +281,21 @@ class LUMICUT_PT_film(Panel, bpy.types.Panel):
         layout.prop(context.scene.render, "film_transparent", text="Transparent")
 
 
+class LUMICUT_PT_pixel_filter(Panel, bpy.types.Panel):
+    bl_label = "Pixel Filter"
+    bl_parent_id = "LUMICUT_PT_film"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and getattr(context.scene, "cycles", None) is not None
+
+    def draw(self, context):
+        layout, of_cycles = split(self.layout), context.scene.cycles
+        layout.prop(of_cycles, "pixel_filter_type", text="Type")
+        if of_cycles.pixel_filter_type != "BOX":
+            layout.prop(of_cycles, "filter_width", text="Width")
+
+
 class LUMICUT_PT_performance(Panel, bpy.types.Panel):
     bl_label = "Performance"
     bl_options = {"DEFAULT_CLOSED"}
@@ -415,7 +430,7 @@ class LUMICUT_PT_simplify_render(Simplify, bpy.types.Panel):
 
 CLASSES = (LUMICUT_PT_sampling_presets, LUMICUT_PT_sampling, LUMICUT_PT_sampling_viewport, LUMICUT_PT_sampling_render,
            LUMICUT_PT_denoise, LUMICUT_PT_sampling_advanced, LUMICUT_PT_light_paths, LUMICUT_PT_max_bounces,
-           LUMICUT_PT_clamping, LUMICUT_PT_caustics, LUMICUT_PT_film, LUMICUT_PT_performance, LUMICUT_PT_acceleration,
+           LUMICUT_PT_clamping, LUMICUT_PT_caustics, LUMICUT_PT_film, LUMICUT_PT_pixel_filter, LUMICUT_PT_performance, LUMICUT_PT_acceleration,
            LUMICUT_PT_lights, LUMICUT_PT_statistics, LUMICUT_PT_notes, LUMICUT_PT_nuances, LUMICUT_PT_simplify,
            LUMICUT_PT_simplify_viewport, LUMICUT_PT_simplify_render)
 

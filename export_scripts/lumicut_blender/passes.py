@@ -11,13 +11,7 @@ NO_DEPTH = 1e10  # as Cycles has it where nothing is hit
 
 # Properties of view layers, and of what Cycles adds to them, for passes that are not there: shown by their names.
 LEFT_OUT = {
-    "use_pass_vector": "Vector", "use_pass_shadow": "Shadow", "use_pass_ambient_occlusion": "Ambient Occlusion",
-    "use_pass_diffuse_direct": "Diffuse Direct",
-    "use_pass_diffuse_indirect": "Diffuse Indirect", "use_pass_diffuse_color": "Diffuse Color",
-    "use_pass_glossy_direct": "Glossy Direct", "use_pass_glossy_indirect": "Glossy Indirect",
-    "use_pass_glossy_color": "Glossy Color", "use_pass_transmission_direct": "Transmission Direct",
-    "use_pass_transmission_indirect": "Transmission Indirect", "use_pass_transmission_color": "Transmission Color",
-    "use_pass_volume_direct": "Volume Direct",
+    "use_pass_vector": "Vector", "use_pass_shadow": "Shadow", "use_pass_volume_direct": "Volume Direct",
     "use_pass_volume_indirect": "Volume Indirect",
 }
 
@@ -29,7 +23,13 @@ BESIDE = {
     "use_pass_uv": ("UV", "UVA", "VECTOR", "hits"),
     "use_pass_emit": (compat.pass_name("Emit"), "RGB", "COLOR", "frame"),
     "use_pass_environment": (compat.pass_name("Env"), "RGB", "COLOR", "frame"),
+    "use_pass_ambient_occlusion": (compat.pass_name("AO"), "RGB", "COLOR", "frame"),
 }
+# What kinds of lobes show, apart: their light over their colour, and that colour.
+LOBES = {"diffuse": ("Diff", library.DIFFUSE_RAYS), "glossy": ("Gloss", library.GLOSSY_RAYS),
+         "transmission": ("Trans", library.TRANSMISSION_RAYS)}
+BESIDE |= {f"use_pass_{lobe}_{what}": (compat.pass_name(short + what[:3].capitalize()), "RGB", "COLOR", "frame")
+           for lobe, (short, _) in LOBES.items() for what in ("direct", "indirect", "color")}
 
 
 def write_pass(render_pass, pixels):
@@ -101,6 +101,37 @@ def scenes_beside(data, layer, collect_aov):
     if layer.use_pass_environment:
         holes = [(name, _as_hole(values)) for name, values in data.materials]
         out[BESIDE["use_pass_environment"][0]] = dataclasses.replace(data, lights=[], materials=holes)
+    return out
+
+
+def of_lobes(layer, scene, frame, factor):
+    """{pass: pixels}: light of kinds of lobes, ambient occlusion. `frame(name, **options)` gives the channels of a frame of
+    this scene; `factor`: of all light."""
+    out = {}
+    world = scene.world
+    if layer.use_pass_ambient_occlusion:
+        out[BESIDE["use_pass_ambient_occlusion"][0]] = frame(
+            "ambient occlusion", occlusion=max(1e-6, world.light_settings.distance if world is not None else 10.0))["radiance"]
+    for lobe, (_, bit) in LOBES.items():
+        direct, indirect, colour = (f"use_pass_{lobe}_{what}" for what in ("direct", "indirect", "color"))
+        of = {}
+        if getattr(layer, indirect):
+            of["all"] = frame(f"{lobe} light", lobes=bit)
+        if getattr(layer, direct) or getattr(layer, indirect):
+            of["direct"] = frame(f"{lobe} direct", lobes=bit, flags=library.DIRECT)
+        if getattr(layer, colour) and not of:
+            of["colour"] = frame(f"{lobe} color", lobes=bit, occlusion=1e-6)
+        if not of:
+            continue
+        albedo = next(iter(of.values()))["albedo"]
+        known = albedo > 1e-5
+        factors = np.where(known, np.float32(factor) / np.where(known, albedo, 1), 0)
+        if getattr(layer, colour):
+            out[BESIDE[colour][0]] = albedo
+        if getattr(layer, direct):
+            out[BESIDE[direct][0]] = of["direct"]["radiance"] * factors
+        if getattr(layer, indirect):
+            out[BESIDE[indirect][0]] = np.maximum(0, of["all"]["radiance"] - of["direct"]["radiance"]) * factors
     return out
 
 

@@ -188,6 +188,24 @@ def of_picture(picture):
     return image(picture, base)
 
 
+def bump_of(height, moved):
+    """The normal that a displacement by height gives. `moved`: of vertices too, from where the height is looked up."""
+    if moved:
+        before = Expr("transform", 0, (attribute(("undisplaced",)),), ("object_to_world",), mean=0)
+        height = replaced(height, {POSITION.key: before}, {})
+    return Expr("bump", 0, (height, ONE, ONE, NORMAL), mean=0)
+
+
+def replaced(expr, table, data):
+    """The same expression with others for some of those that it is made of, and other data for some of its operations'."""
+    done = {}
+    for part in in_order(expr):
+        inputs = [done.get(i.key, i) for i in part.inputs]
+        read = data.get(part.data, part.data) if isinstance(part.data, tuple) else part.data
+        done[part.key] = table.get(part.key) or Expr(part.op, part.mode, inputs, read, part.mean)
+    return done.get(expr.key, expr)
+
+
 def in_order(expr):
     """Each that it is made of but the constants, once, after its inputs."""
     found, entered, stack = {}, set(), [expr]
@@ -469,16 +487,18 @@ class Compiler:
         n = mix(BEHIND, normalize(n), vector_math("SCALE", normalize(n), const(-1)))
         return normalize(mix(number_math("MAXIMUM", strength, ZERO), NORMAL, n))
 
-    def displacement(self, socket, stack=()):
-        """The normal that a displacement by height gives; None: none."""
+    def height(self, socket, stack=()):
+        """(height, whether it is in the world's units) of a displacement; None: none."""
         node, _, stack = self.reader.source(socket, stack)
         if node is None:
             return None
         if node.type != "DISPLACEMENT":
             raise CannotCompile(node.bl_label)
+        if node.inputs["Normal"].is_linked:
+            self.note("Displacement", "Normals of displacements left out")
         height = number_math("MULTIPLY", number_math("SUBTRACT", self.get(node, stack, "Height"), self.get(node, stack, "Midlevel")),
                              self.get(node, stack, "Scale"))
-        return None if height.constant() else Expr("bump", 0, (height, ONE, ONE, NORMAL), mean=0)
+        return height, node.space == "WORLD"
 
     # ---- Textures -----------------------------------------------------------------------------------------------
 

@@ -39,6 +39,7 @@ class Mesh:
     attributes: list = dataclasses.field(default_factory=list)   # (number, library.OF_VERTICES ..., (places, components))
     of_instances: dict = dataclasses.field(default_factory=dict)  # number: values of each transform, for OF_INSTANCES
     catcher: bool = False                # a shadow catcher [shadow_catcher.py]
+    links: tuple = (0, 0, 0, 0)          # linking.Links
     owners: list = dataclasses.field(default_factory=list)  # of each transform, into SceneData.objects, where passes ask for it
     uv_map: np.ndarray | None = None     # (t, 3, 2) as the mesh has it, where a pass asks for it
 
@@ -146,10 +147,11 @@ class SceneData:
                 positions, normals, indices = baked(mesh, check)
                 check()
                 scene.add_mesh(positions, indices, normals, mesh.uvs, mesh.materials, mesh.material, group=mesh.group,
-                               mask=mesh.mask, attributes=mesh.all_attributes())
+                               mask=mesh.mask, attributes=mesh.all_attributes(), links=mesh.links)
             else:
                 scene.add_mesh(mesh.positions, mesh.indices, mesh.normals, mesh.uvs, mesh.materials, mesh.material,
-                               np.array(mesh.transforms, np.float32), mesh.group, mesh.mask, mesh.all_attributes())
+                               np.array(mesh.transforms, np.float32), mesh.group, mesh.mask, mesh.all_attributes(),
+                               mesh.links)
         scene.set_profiles([(p.vertical, p.horizontal, p.values) for p in self.profiles])
         scene.set_lights([light for _, light in self.lights])
         scene.set_environment(self.environment)

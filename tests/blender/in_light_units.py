@@ -83,6 +83,56 @@ class LightUnits(unittest.TestCase):
                 np.testing.assert_allclose(a.mean((0, 1)) / b.mean((0, 1)), 1, atol=MEAN)
                 self.assertLess(np.abs(a - b).max() / b.max(), BLOCK)
 
+    def textured(self, kind, coordinate, texture, scale=2.0, **values):
+        """A lamp whose colour is a texture by coordinates: (node, output)."""
+        ob = h.add_light(kind, **{"location": (0.3, 0.2, 1.2), "energy": 100, "rotation": (0.3, -0.2, 0.7), **values})
+        ob.data.use_nodes = True
+        tree = ob.data.node_tree
+        emission = next(n for n in tree.nodes if n.type == "EMISSION")
+        node, source = tree.nodes.new(texture), tree.nodes.new(coordinate[0])
+        if texture == "ShaderNodeTexImage":
+            node.image = bpy.data.images.new("pattern", 8, 8, float_buffer=True)
+            pixels = np.ones((8, 8, 4), np.float32)
+            y, x = np.mgrid[:8, :8]
+            pixels[..., 0], pixels[..., 1], pixels[..., 2] = (x < 4) * 2.0, (y < 3) * 1.0, 0.2
+            node.image.pixels.foreach_set(pixels.ravel())
+        else:
+            node.inputs["Scale"].default_value = scale
+        tree.links.new(source.outputs[coordinate[1]], node.inputs["Vector"])
+        tree.links.new(node.outputs[0], emission.inputs["Color"])
+        return ob
+
+    def test_textures_over_area_lamps(self):
+        for shape, coordinate, texture in (("RECTANGLE", ("ShaderNodeNewGeometry", "Parametric"), "ShaderNodeTexImage"),
+                                           ("ELLIPSE", ("ShaderNodeTexCoord", "Generated"), "ShaderNodeTexChecker"),
+                                           ("SQUARE", ("ShaderNodeTexCoord", "Normal"), "ShaderNodeTexNoise"),
+                                           ("RECTANGLE", ("ShaderNodeTexCoord", "UV"), "ShaderNodeTexImage")):
+            with self.subTest(shape=shape, coordinate=coordinate):
+                self.setUp()
+                self.textured("AREA", coordinate, texture, shape=shape, size=1.5, size_y=1.0)
+                self.agree(block=0.05)
+                self.assertEqual(h.last_notes(), [])
+
+    def test_images_that_lamps_throw(self):
+        for kind, coordinate, texture in (("POINT", ("ShaderNodeTexCoord", "Normal"), "ShaderNodeTexChecker"),
+                                          ("SPOT", ("ShaderNodeTexCoord", "Normal"), "ShaderNodeTexImage"),
+                                          ("SPOT", ("ShaderNodeNewGeometry", "Normal"), "ShaderNodeTexNoise"),
+                                          ("POINT", ("ShaderNodeTexCoord", "Generated"), "ShaderNodeTexChecker")):
+            with self.subTest(kind=kind, coordinate=coordinate):
+                self.setUp()
+                lamp = self.textured(kind, coordinate, texture, shadow_soft_size=0)
+                if kind == "SPOT":
+                    lamp.data.spot_size, lamp.data.spot_blend = 2.0, 0.3
+                self.agree(block=0.12)  # sharp edges run through blocks
+                self.assertEqual(h.last_notes(), [])
+
+    def test_coordinates_that_lamps_do_not_have_are_named(self):
+        self.textured("AREA", ("ShaderNodeTexCoord", "Window"), "ShaderNodeTexNoise")
+        with h.quiet():
+            h.set_lumicut("exhaustive", vpls=50)
+            h.render()
+        self.assertTrue([note for note in h.last_notes() if "constant" in note and "AREA" in note], h.last_notes())
+
     def test_a_lamp_at_a_ceiling_lights_the_room_below(self):
         ceiling = h.add_plane(6, 2.5, h.diffuse())
         ceiling.visible_camera = False

@@ -284,3 +284,115 @@ class Layers(BesideCycles):
             h.set_lumicut("exhaustive", vpls=100)
             h.render()
         self.assertIn("Shaders taken as diffuse: Toon (Toon BSDF)", h.last_notes())
+
+
+class Reach(BesideCycles):
+    """What a lamp lights, by kinds of rays and by linking."""
+
+    def setUp(self):
+        super().setUp()
+        bpy.data.objects.remove(next(ob for ob in self.scene.objects if ob.type == "LIGHT"))
+        self.ground = h.add_plane(6, material=h.diffuse())
+        gloss = h.material("Gloss")
+        h.shader(gloss, "ShaderNodeBsdfGlossy", Roughness=0.5).distribution = "GGX"
+        mirror = h.material("Mirror")
+        h.shader(mirror, "ShaderNodeBsdfGlossy", Roughness=0.0)
+        self.balls = [h.add_sphere(0.8, (x, 0, 0.8), m) for x, m in ((-1.7, h.diffuse()), (1.7, mirror))]
+        self.plate = h.add_plane(1.5, 0.3, gloss, "Plate")
+
+    def test_lamps_hidden_from_kinds_of_rays(self):
+        self.balls[1].hide_render = True  # a mirror's image of a lamp is a few pixels, all noise
+        for kind, values in (("POINT", {"shadow_soft_size": 0.0}), ("AREA", {"size": 1.5}), ("SUN", {"energy": 0.5, "angle": 0.1})):
+            lamp = h.add_light(kind, (0.5, -1, 4), **{"energy": 100, **values})
+            for ray in ("diffuse", "glossy"):
+                with self.subTest(kind=kind, ray=ray):
+                    setattr(lamp, "visible_" + ray, False)
+                    try:
+                        _, notes = self.compare(0.02, 64, vpls=1000)
+                        self.assertEqual(notes, "")
+                    finally:
+                        setattr(lamp, "visible_" + ray, True)
+            bpy.data.objects.remove(lamp)
+
+    def test_lamps_that_the_camera_sees(self):
+        for kind, values in (("AREA", {"size": 1.5, "shape": "DISK"}), ("POINT", {"shadow_soft_size": 0.5}),
+                             ("SPOT", {"shadow_soft_size": 0.5, "spot_size": 2.5})):
+            with self.subTest(kind=kind):
+                lamp = h.add_light(kind, (0, 2, 1), energy=3, rotation=(-1.5, 0, 0) if kind != "POINT" else (0, 0, 0), **values)
+                lamp.rotation_euler = (0, 0, 0)
+                lamp.location = (0.6, 0.4, 3)
+                self.scene.camera.location, self.scene.camera.rotation_euler = (0.5, 0.2, 0.5), (3.0, 0, 0)
+                lamp.visible_camera = True
+                try:
+                    _, notes = self.compare(0.02, 64, vpls=400)
+                    self.assertEqual(notes, "")
+                finally:
+                    bpy.data.objects.remove(lamp)
+
+    @unittest.skipIf(bpy.app.version < (4, 0, 0), "linking came with 4.0")
+    def test_linked_lamps(self):
+        lamp = h.add_light("POINT", (1.2, -2, 3), 150, shadow_soft_size=0.0)
+        h.add_light("POINT", (-2, -2, 3), 50, shadow_soft_size=0.0)
+        linked = bpy.data.collections.new("linked")
+        self.plate.data.materials[0] = h.diffuse((0.3, 0.6, 0.2), "green")
+        self.balls[1].hide_render = True  # mirrors show what they see whatever the bounces
+        for what in ("receiver_collection", "blocker_collection"):
+            setattr(lamp.light_linking, what, linked)
+            for state in ("INCLUDE", "EXCLUDE"):
+                for objects in (self.balls[:1], [self.ground, self.plate]):
+                    with self.subTest(what=what, state=state, count=len(objects)):
+                        for ob in list(linked.objects):
+                            linked.objects.unlink(ob)
+                        for ob in objects:
+                            linked.objects.link(ob)
+                        for link in linked.collection_objects:
+                            link.light_linking.link_state = state
+                        _, notes = self.compare(0.02, 64)
+                        self.assertEqual(notes, "")
+            setattr(lamp.light_linking, what, None)
+
+
+class Displacement(BesideCycles):
+    """Vertices moved by the material."""
+
+    def displaced(self, method, space="OBJECT", image=False):
+        m = h.diffuse((0.7, 0.6, 0.5), "displaced")
+        tree = m.node_tree
+        output = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
+        node, texture = tree.nodes.new("ShaderNodeDisplacement"), tree.nodes.new("ShaderNodeTexImage" if image else "ShaderNodeTexNoise")
+        node.space, node.inputs["Scale"].default_value = space, 0.6
+        if image:
+            pixels = np.zeros((32, 32, 4), np.float32)
+            x, y = np.meshgrid(np.arange(32), np.arange(32))
+            pixels[..., :3] = (0.5 + 0.5 * np.sin(x / 5) * np.cos(y / 4))[..., None]
+            picture = bpy.data.images.new("heights", 32, 32, float_buffer=True)
+            picture.pixels.foreach_set(pixels.ravel())
+            texture.image = picture
+        else:
+            texture.inputs["Scale"].default_value = 1.5
+            coordinates = tree.nodes.new("ShaderNodeTexCoord")
+            tree.links.new(coordinates.outputs["Object"], texture.inputs["Vector"])
+        tree.links.new(texture.outputs[0], node.inputs["Height"])
+        tree.links.new(node.outputs[0], output.inputs["Displacement"])
+        owner = m if hasattr(m, "displacement_method") else m.cycles
+        owner.displacement_method = method
+        return m
+
+    def test_vertices_move_as_in_cycles(self):
+        for space, image, scale in (("OBJECT", False, 1.0), ("OBJECT", True, 1.0), ("WORLD", False, 2.0)):
+            with self.subTest(space=space, image=image):
+                ball = h.add_sphere(1.2 / scale, material=self.displaced("DISPLACEMENT", space, image), segments=64)
+                ball.scale = (scale,) * 3
+                uvs = ball.data.uv_layers.new(name="UVMap")
+                places = np.array([ball.data.vertices[l.vertex_index].co[:] for l in ball.data.loops])
+                uvs.data.foreach_set("uv", (0.5 + 0.3 * places[:, :2]).astype(np.float32).ravel())
+                _, notes = self.compare(0.02)
+                self.assertEqual(notes, "")
+                bpy.data.objects.remove(ball)
+
+    def test_bumps_may_lie_on_moved_vertices(self):
+        h.add_sphere(1.2, material=self.displaced("BOTH"), segments=24)
+        ours, theirs = h.both(16, 16, 0)
+        # Slopes over other steps on coarse triangles.
+        np.testing.assert_allclose(ours["Combined"].mean((0, 1)), theirs["Combined"].mean((0, 1)), rtol=0.06)
+        self.assertEqual(h.last_notes(), [])

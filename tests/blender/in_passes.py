@@ -87,6 +87,47 @@ class BesideCycles(unittest.TestCase):
                 np.testing.assert_allclose(h.blocks(ours[name]), h.blocks(theirs[name]), atol=0.05 * exposure, err_msg=name)
                 np.testing.assert_allclose(ours[name].mean(), theirs[name].mean(), rtol=0.01)
 
+    def test_light_of_kinds_of_lobes_sums_to_the_image(self):
+        """Each pass agrees with Cycles', and all together, with emission and world, are Combined."""
+        lobes = [(lobe, what) for lobe in ("diffuse", "glossy", "transmission") for what in ("direct", "indirect", "color")]
+        for lobe, what in lobes:
+            setattr(self.layer, f"use_pass_{lobe}_{what}", True)
+        self.layer.use_pass_emit = self.layer.use_pass_environment = True
+        m = h.material("mixed")
+        mix, gloss, tree = h.shader(m, "ShaderNodeMixShader"), m.node_tree.nodes.new("ShaderNodeBsdfGlossy"), m.node_tree
+        diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
+        mix.inputs[0].default_value, gloss.inputs["Roughness"].default_value = 0.4, 0.5
+        diffuse.inputs["Color"].default_value, gloss.inputs["Color"].default_value = (0.7, 0.3, 0.2, 1), (0.6, 0.7, 0.8, 1)
+        tree.links.new(diffuse.outputs[0], mix.inputs[1])
+        tree.links.new(gloss.outputs[0], mix.inputs[2])
+        self.ground.data.materials[0] = m
+        h.add_sphere(0.4, (-0.6, 0.4, 0.5), h.emission(2), name="Lamp")
+        mirror = h.material("mirror")
+        h.shader(mirror, "ShaderNodeBsdfGlossy", Roughness=0.0, Color=(0.9, 0.8, 0.7, 1))
+        h.add_sphere(0.3, (-0.5, -0.5, 0.4), mirror, name="Mirror")
+        with h.quiet():
+            h.set_cycles(512, 8)
+            theirs = h.render()
+            h.set_lumicut("exhaustive", 4, passes=16, vpls=2000, compensate=True)
+            ours = h.render()
+        self.assertEqual(h.last_notes(), [])
+        for image in (ours, theirs):
+            whole = image["Emit"] + image["Env"]
+            for short in ("Diff", "Gloss", "Trans"):
+                whole = whole + image[short + "Col"] * (image[short + "Dir"] + image[short + "Ind"])
+            np.testing.assert_allclose(h.blocks(whole), h.blocks(image["Combined"][..., :3]), atol=0.02)
+        for name in ("DiffDir", "DiffInd", "DiffCol", "GlossDir", "GlossInd", "GlossCol"):
+            a, b = h.blocks(ours[name]), h.blocks(theirs[name])
+            np.testing.assert_allclose(a.mean((0, 1)), b.mean((0, 1)), rtol=0.04, atol=2e-3, err_msg=name)
+
+    def test_ambient_occlusion(self):
+        self.layer.use_pass_ambient_occlusion = True
+        for distance in (10, 0.4):
+            self.scene.world.light_settings.distance = distance
+            ours, theirs = self.render_both()
+            np.testing.assert_allclose(h.blocks(ours["AO"]), h.blocks(theirs["AO"]), atol=0.04)
+            np.testing.assert_allclose(ours["AO"].mean(), theirs["AO"].mean(), rtol=0.01)
+
     def test_aovs_of_constants_images_and_programs(self):
         for name, kind in (("tint", "COLOR"), ("worn", "VALUE")):
             aov = self.layer.aovs.add()

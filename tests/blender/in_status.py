@@ -470,9 +470,11 @@ def _(test):
     ob("Lamp").data.cycles.is_portal = True
 
 
-@feature("Lamps", "ray visibility: diffuse")
-def _(test):
-    ob("Lamp").visible_diffuse = False
+for ray in ("diffuse", "glossy"):
+    @feature("Lamps", f"ray visibility: {ray}")
+    def _(test, ray=ray):
+        h.shader(ob("Ground").data.materials[0], "ShaderNodeBsdfGlossy", Roughness=0.5)
+        setattr(ob("Lamp"), "visible_" + ray, False)
 
 
 @feature("Lamps", "ray visibility: camera, of area lamps")
@@ -530,7 +532,7 @@ def _(test):
     tree.links.new(tree.nodes.new("ShaderNodeVolumeScatter").outputs[0], output.inputs["Volume"])
 
 
-for ray in ("camera", "diffuse"):
+for ray in ("camera", "diffuse", "glossy"):
     @feature("Worlds", f"ray visibility: {ray}")
     def _(test, ray=ray):
         setattr(bpy.context.scene.world.cycles_visibility, ray, False)

@@ -312,7 +312,12 @@ class Backdrops(unittest.TestCase):
         self.background.inputs["Color"].default_value = (0.2, 0.4, 0.9, 1)
         self.scene.world.cycles_visibility.camera = False
         self.assertEqual(self.compare(), [])
-        self.scene.world.cycles_visibility.diffuse = False
-        with h.quiet():
-            h.render()
-        self.assertEqual(h.last_notes(), ["Worlds hidden from some rays, which all see here: World"])
+
+    def test_a_world_hidden_from_kinds_of_rays(self):
+        self.background.inputs["Color"].default_value = (0.2, 0.4, 0.9, 1)
+        h.add_light("AREA", (0, 0, 4), 100)
+        for ray in ("diffuse", "glossy"):
+            with self.subTest(ray=ray):
+                setattr(self.scene.world.cycles_visibility, ray, False)
+                self.assertEqual(self.compare(), [])
+                setattr(self.scene.world.cycles_visibility, ray, True)

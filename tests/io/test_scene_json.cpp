@@ -127,6 +127,46 @@ TEST(SceneJson, MeshesAreHiddenFromKindsOfRays) {
             {"meshes[0].hidden_from[1]", "\"shadows\"", "\"shadow\""});
 }
 
+TEST(SceneJson, LightsAndEnvironmentsAreHiddenFromKindsOfRays) {
+  const auto light = [](const json& kinds) {
+    return changed([&](json& s) {
+      s["lights"] = {{{"type", "point"}, {"position", {0, 1, 0}}, {"value", 1}, {"hidden_from", kinds}}};
+      s["environment"] = {{"hidden_from", kinds}};
+    });
+  };
+  const SceneData seen = light(json::array()), limited = light({"camera", "diffuse"});
+  EXPECT_EQ(seen.lights[0].mask, 31u) << "by the camera too";
+  EXPECT_EQ(seen.environment->mask, 0u);
+  EXPECT_EQ(limited.lights[0].mask, 31u - LUMICUT_CAMERA_RAYS - LUMICUT_DIFFUSE_RAYS);
+  EXPECT_EQ(limited.environment->flags, uint32_t{LUMICUT_HIDDEN});
+  EXPECT_EQ(limited.environment->mask, uint32_t{LUMICUT_CAMERA_RAYS | LUMICUT_GLOSSY_RAYS | LUMICUT_TRANSMISSION_RAYS});
+  expect_in(error([](json& s) {
+              s["lights"] = {{{"type", "rectangle"},
+                              {"position", {0, 1, 0}},
+                              {"u", {1, 0, 0}},
+                              {"v", {0, 1, 0}},
+                              {"value", 1},
+                              {"visible", true},
+                              {"hidden_from", {"diffuse"}}}};
+            }),
+            {"lights[0].hidden_from", "is not for a visible light"});
+}
+
+TEST(SceneJson, LightsAreLinkedToMeshes) {
+  const SceneData data = changed([](json& s) {
+    s["lights"] = {{{"type", "point"}, {"position", {0, 1, 0}}, {"value", 1}, {"receivers", 32}, {"blockers", 27}}};
+    s["meshes"][0]["not_lit_by"] = {1, 32}, s["meshes"][0]["not_blocking"] = {2};
+    s["meshes"][0]["receivers"] = 4, s["meshes"][0]["blockers"] = 5;
+  });
+  EXPECT_EQ(data.lights[0].receivers, 32u);
+  EXPECT_EQ(data.lights[0].blockers, 27u);
+  EXPECT_EQ(data.meshes[0].not_lit_by, 0x80000001u);
+  EXPECT_EQ(data.meshes[0].not_blocking, 2u);
+  EXPECT_EQ(data.meshes[0].receivers, 4u);
+  EXPECT_EQ(data.meshes[0].blockers, 5u);
+  expect_in(error([](json& s) { s["meshes"][0]["not_blocking"] = {28}; }), {"meshes[0].not_blocking[0]", "28"});
+}
+
 TEST(SceneJson, UnitScaleTurnsLengthsIntoMetresAndNothingElse) {
   const SceneData scene = changed([](json& s) {
     s["unit_scale"] = 0.01;

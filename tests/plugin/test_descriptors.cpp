@@ -182,6 +182,7 @@ TEST(Abi, DescriptorsOfAnySizeAreReadByTheGrowthRule) {
     auto d = g.mesh();
     const float transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     d.transforms = transform, d.transform_count = 1, d.material = 1, d.group = 2, d.mask = 3;
+    d.not_lit_by = 1, d.not_blocking = 2, d.receivers = 1, d.blockers = 2;
     check_input("lumicut_mesh", bytes_of(d), fields_of<T>(),
                 [&](const void* p) { return lumicut_scene_add_mesh(s.get(), static_cast<const T*>(p), nullptr); });
   }
@@ -196,14 +197,15 @@ TEST(Abi, DescriptorsOfAnySizeAreReadByTheGrowthRule) {
   {
     using T = lumicut_light;
     auto d = lamp();
-    d.spread = 1;
+    d.spread = 1, d.mask = LUMICUT_GLOSSY_RAYS, d.receivers = 1, d.blockers = 2;
     check_input("lumicut_light", bytes_of(d), fields_of<T>(),
                 [&](const void* p) { return lumicut_scene_set_lights(s.get(), static_cast<const T*>(p), 1); });
   }
   {
     using T = lumicut_environment;
     auto d = make<T>();
-    d.color[0] = 1, d.flags = LUMICUT_HIDDEN, d.world_to_map[0] = d.world_to_map[4] = d.world_to_map[8] = 1;
+    d.color[0] = 1, d.flags = LUMICUT_HIDDEN, d.mask = LUMICUT_DIFFUSE_RAYS,
+    d.world_to_map[0] = d.world_to_map[4] = d.world_to_map[8] = 1;
     check_input("lumicut_environment", bytes_of(d), fields_of<T>(),
                 [&](const void* p) { return lumicut_scene_set_environment(s.get(), static_cast<const T*>(p)); });
   }

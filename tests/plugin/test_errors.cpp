@@ -210,6 +210,10 @@ TEST(Errors, FieldsOfLightsAreCheckedByNameAndValue) {
       {[&](L& l) { spot(l), l.blend = 1.5f; }, "lumicut_light[0].blend: 1.5"},
       {[&](L& l) { spot(l), l.spot_cosine = 2; }, "lumicut_light[0].spot_cosine: 2"},
       {[](L& l) { l.flags = 4; }, "lumicut_light[0].flags: 4", LUMICUT_UNSUPPORTED},
+      {[](L& l) { l.mask = 32; }, "lumicut_light[0].mask: 32", LUMICUT_UNSUPPORTED},
+      {[](L& l) { l.texture = 1, l.type = LUMICUT_POINT; }, "lumicut_light[0].texture: a point"},
+      {[](L& l) { l.receivers = 33; }, "lumicut_light[0].receivers: 33 is not in [0, 32]"},
+      {[](L& l) { l.blockers = 28; }, "lumicut_light[0].blockers: 28 is not in [0, 27]"},
       {[](L& l) { l.flags = LUMICUT_FACING_DISK; }, "lumicut_light[0].flags: LUMICUT_FACING_DISK is not for a"},
   };
   for (const auto& w : wrongs) {
@@ -239,6 +243,10 @@ TEST(Errors, FieldsOfMeshesTexturesCamerasAndEnvironmentsAreCheckedByNameAndValu
   refused_mesh([&](auto& m) { m.transforms = broken, m.transform_count = 1; }, "lumicut_mesh.transforms[4]: nan");
   refused_mesh([&](auto& m) { m.transform_count = 2; }, "lumicut_mesh.transforms: is NULL");
   refused_mesh([&](auto& m) { m.group = 65536; }, "lumicut_mesh.group: 65536");
+  refused_mesh([&](auto& m) { m.not_blocking = 1u << 27; },
+               "lumicut_mesh.not_blocking: 134217728 names sets beyond 27");
+  refused_mesh([&](auto& m) { m.receivers = 33; }, "lumicut_mesh.receivers: 33");
+  refused_mesh([&](auto& m) { m.blockers = 28; }, "lumicut_mesh.blockers: 28");
 
   const unsigned char pixels[64] = {};
   const auto refused_texture = [&](const std::function<void(lumicut_texture&)>& spoil, lumicut_result code,

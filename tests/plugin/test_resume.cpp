@@ -130,6 +130,8 @@ std::vector<Change> scene_changes() {
       light(
           "light.spread", [](L& l) { l.spread = 1; }, 0),
       light(
+          "light.texture", [](L& l) { l.texture = 1; }, 0),
+      light(
           "light.type", [](L& l) { l.type = LUMICUT_DISK; }, 0),
       {"environment.color", [](Host& h) { h.environment.color[0] = 0.3f; }},
       {"environment.texture", [](Host& h) { h.environment.texture = 3; }},
@@ -140,6 +142,11 @@ std::vector<Change> scene_changes() {
          std::copy(turned, turned + 9, h.environment.world_to_map);
        }},
       {"environment.flags", [](Host& h) { h.environment.flags = LUMICUT_HIDDEN; }},
+      {"environment.mask", [](Host& h) { h.environment.mask = LUMICUT_GLOSSY_RAYS; }},
+      {"mesh.not_lit_by", [](Host& h) { h.shape.not_lit_by = 1; }},
+      {"mesh.not_blocking", [](Host& h) { h.shape.not_blocking = 1; }},
+      {"mesh.receivers", [](Host& h) { h.shape.receivers = 1; }},
+      {"mesh.blockers", [](Host& h) { h.shape.blockers = 1; }},
       {"no environment", [](Host& h) { h.environment = make<lumicut_environment>(); }},
   };
 }
@@ -152,6 +159,9 @@ std::vector<Change> spot_changes() {
       {"light.spot_cosine", [](Host& h) { h.lights[1].spot_cosine = 1; }},
       {"light.radius", [](Host& h) { h.lights[1].radius = 0.1f; }},
       {"light.flags, disk", [](Host& h) { h.lights[1].flags = LUMICUT_FACING_DISK; }},
+      {"light.mask", [](Host& h) { h.lights[1].mask = LUMICUT_DIFFUSE_RAYS; }},
+      {"light.receivers", [](Host& h) { h.lights[1].receivers = 1; }},
+      {"light.blockers", [](Host& h) { h.lights[1].blockers = 1; }},
       {"light.flags, shadows", [](Host& h) { h.lights[1].flags = LUMICUT_NO_SHADOWS; }},
   };
 }
@@ -192,6 +202,9 @@ std::vector<Change> render_changes() {
       {"render.confidence", [](Host& h) { h.frame.confidence = 0.9f; }},
       {"render.flags illuminance", [](Host& h) { h.frame.flags |= LUMICUT_ILLUMINANCE; }},
       {"render.filter", [](Host& h) { h.frame.filter = LUMICUT_BLACKMAN_HARRIS; }},
+      {"render.lobes", [](Host& h) { h.frame.lobes = LUMICUT_GLOSSY_RAYS; }},
+      {"render.occlusion", [](Host& h) { h.frame.occlusion = 2; }},
+      {"render.flags, direct", [](Host& h) { h.frame.flags |= LUMICUT_DIRECT; }},
       {"render.filter_width", [](Host& h) { h.frame.filter = LUMICUT_GAUSSIAN, h.frame.filter_width = 2; }},
       {"render.flags denoise", [](Host& h) { h.frame.flags |= LUMICUT_DENOISE; }},
       {"render.flags groups", [](Host& h) { h.frame.flags |= LUMICUT_GROUPS; }},

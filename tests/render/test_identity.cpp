@@ -80,25 +80,25 @@ size_t expect_every_field_counts(const T& value) {
 }
 
 TEST(Identity, EveryFieldOfAMaterialCounts) { EXPECT_EQ(expect_every_field_counts(Material{}), 46u); }
-TEST(Identity, EveryFieldOfALightCounts) { EXPECT_EQ(expect_every_field_counts(Light{}), 28u); }
-TEST(Identity, EveryFieldOfAnEnvironmentCounts) { EXPECT_EQ(expect_every_field_counts(Environment{}), 15u); }
+TEST(Identity, EveryFieldOfALightCounts) { EXPECT_EQ(expect_every_field_counts(Light{}), 32u); }
+TEST(Identity, EveryFieldOfAnEnvironmentCounts) { EXPECT_EQ(expect_every_field_counts(Environment{}), 18u); }
 TEST(Identity, EveryFieldOfACameraCounts) { EXPECT_EQ(expect_every_field_counts(Camera{}), 31u); }
-TEST(Identity, EveryFieldOfAVirtualLightCounts) { EXPECT_EQ(expect_every_field_counts(Vpl{}), 25u); }
+TEST(Identity, EveryFieldOfAVirtualLightCounts) { EXPECT_EQ(expect_every_field_counts(Vpl{}), 27u); }
 TEST(Identity, EveryFieldOfAFrameCounts) {
-  EXPECT_EQ(expect_every_field_counts(FrameOptions{}), 14u);
+  EXPECT_EQ(expect_every_field_counts(FrameOptions{}), 17u);
   FrameOptions frame;
   frame.camera_samples = {0, 0};
-  EXPECT_EQ(expect_every_field_counts(frame), 15u);
+  EXPECT_EQ(expect_every_field_counts(frame), 18u);
 }
 TEST(Identity, EveryFieldOfAMeshCounts) {
-  EXPECT_EQ(expect_every_field_counts(Mesh{}), 10u);
+  EXPECT_EQ(expect_every_field_counts(Mesh{}), 14u);
   Mesh mesh;
   mesh.positions.resize(2), mesh.normals.resize(1), mesh.uvs.resize(1), mesh.instances.resize(1);
   mesh.indices = {1}, mesh.triangle_materials = {2};
   MeshAttribute attribute;
   attribute.values = {1};
   mesh.attributes = {attribute};
-  EXPECT_EQ(expect_every_field_counts(mesh), 10u + 3 + 3 + 2 + 1 + 1 + 12 + 5);
+  EXPECT_EQ(expect_every_field_counts(mesh), 14u + 3 + 3 + 2 + 1 + 1 + 12 + 5);
 }
 TEST(Identity, EveryFieldOfATextureCounts) {
   const uint8_t bytes[] = {1, 2};
@@ -137,7 +137,7 @@ TEST(Identity, LightProfilesCountByTheirContent) {
   EXPECT_NE(hash(0.5f), hash_value(0, LightProfiles{}));
 }
 TEST(Identity, EveryFieldOfASetOfVirtualLightsCounts) {
-  EXPECT_EQ(expect_every_field_counts(VplSet{{Vpl{}, Vpl{}}, 3, 1, 1, {}}), 30u);
+  EXPECT_EQ(expect_every_field_counts(VplSet{{Vpl{}, Vpl{}}, 3, 1, 1, {}}), 32u);
 }
 TEST(Identity, EveryFieldOfAScenesConfigurationCounts) { EXPECT_GE(expect_every_field_counts(Scene::Config{}), 3u); }
 

@@ -190,6 +190,9 @@ typedef struct lumicut_mesh {
   uint32_t group;             /* light group of what it emits, 0..2^16-1 */
   const lumicut_attribute* attributes; /* what programs ask for (lumicut_programs.h); NULL: none */
   uint64_t attribute_count;
+  uint32_t not_lit_by;        /* light linking: bit n-1: it is not among the receivers of set n (lumicut_light.receivers) */
+  uint32_t not_blocking;      /* bit n-1: nor among the blockers of set n */
+  uint32_t receivers, blockers; /* sets for what it emits, as those of a light; 0: all */
 } lumicut_mesh;
 
 typedef struct lumicut_light {
@@ -213,6 +216,13 @@ typedef struct lumicut_light {
                          4 pi) multiplies its values, and radius is passed over. 0: none */
   float tangent[3];   /* profile: where its horizontal angle 0 lies, made orthogonal to direction; 0: anywhere */
   uint32_t flags;     /* LUMICUT_FACING_DISK, LUMICUT_NO_SHADOWS */
+  uint32_t mask;      /* LUMICUT_CAMERA_RAYS ...: kinds of rays that see it; 0: all but the camera's. What diffuse rays do not see
+                         lights no diffuse surface, nor by way of one; glossy: no gloss, and no mirror shows it; transmission: glass
+                         does not. Of lamps the camera sees those with a radius or an area, over what lies behind them */
+  uint32_t receivers; /* light linking: number of a set, 1..32, of the meshes that it lights; 0: all. What they reflect lights all */
+  uint32_t blockers;  /* 1..27: set of the meshes that stand before it; 0: all */
+  int32_t texture;    /* rectangle, disk: 1 + index into the textures, an image (no program), which multiplies color where it
+                         lies: u from 0 to 1 along u, v along v; 0: none */
 } lumicut_light;
 /* FACING_DISK: point, spot: a disk of that radius which faces each point that it lights, in place of the sphere (Blender
    before 4.0). NO_SHADOWS: nothing stands before it. */
@@ -271,7 +281,9 @@ typedef struct lumicut_render_desc {
                          channel; LUMICUT_GROUPS: one image for each light group too, in channels "radiance.GROUP";
                          LUMICUT_DENOISE: fill "denoised", "denoised_error" and what a host's own denoiser takes,
                          "denoising_color", "denoising_albedo", "denoising_normal", at the end of at least two passes;
-                         with LUMICUT_KEEP_FIREFLIES rare bright samples stay where they fell. Other channels are as without */
+                         with LUMICUT_KEEP_FIREFLIES rare bright samples stay where they fell. Other channels are as without.
+                         LUMICUT_DIRECT: the light alone that comes from what emits to what the camera sees, without a surface
+                         between */
   const void* checkpoint; /* go on from there: scene, integrator, parameters, the library's version and the fields above but
                              the stops must be the same, and so is the image, bit for bit. One that holds all that is asked
                              for, or more, gives the image that it holds. NULL: begin */
@@ -279,9 +291,13 @@ typedef struct lumicut_render_desc {
   uint32_t filter;     /* of pixels: LUMICUT_BOX ... */
   float filter_width;  /* in pixels, 0.01..10; box: 1 alone; 0: 1 for the box, else 1.5. The Gaussian exp(-2 (2x/width)^2) ends at
                           1.5 widths from the centre, Blackman-Harris' window at 1 */
+  uint32_t lobes;      /* LUMICUT_DIFFUSE_RAYS, GLOSSY, TRANSMISSION: what these lobes of what the camera sees show, alone, without
+                          what is seen to emit; the channel albedo is of them too; 0: all */
+  float occlusion;     /* above 0: the image is ambient occlusion instead: of the directions above a surface, by their cosine, the
+                          share in which nothing lies within this distance; 0: no */
 } lumicut_render_desc;
 enum { LUMICUT_BOX = 0, LUMICUT_GAUSSIAN = 1, LUMICUT_BLACKMAN_HARRIS = 2 };
-enum { LUMICUT_CHECKPOINTS = 1, LUMICUT_ILLUMINANCE = 2, LUMICUT_GROUPS = 4, LUMICUT_DENOISE = 8, LUMICUT_KEEP_FIREFLIES = 16 };
+enum { LUMICUT_CHECKPOINTS = 1, LUMICUT_ILLUMINANCE = 2, LUMICUT_GROUPS = 4, LUMICUT_DENOISE = 8, LUMICUT_KEEP_FIREFLIES = 16, LUMICUT_DIRECT = 32 };
 
 typedef struct lumicut_status {
   uint32_t struct_size;
@@ -354,6 +370,7 @@ typedef struct lumicut_environment {
   float world_to_map[9]; /* row-major rotation; all 0: identity. In map space z is up: u = 1/2 - atan2(y,x)/2pi,
                             v = 1/2 + atan2(z,hypot(x,y))/pi */
   uint32_t flags;       /* LUMICUT_HIDDEN: it lights the scene, but camera rays that leave it bring black */
+  uint32_t mask;        /* kinds of rays that see it, as lumicut_light.mask; 0: all. The camera's are LUMICUT_HIDDEN's alone */
 } lumicut_environment;
 enum { LUMICUT_HIDDEN = 1 };
 
