@@ -45,11 +45,16 @@ void add_frame_options(CLI::App& command, FrameSetup& setup) {
       ->excludes("--integrator");
   command.add_option("--spp", setup.samples, "Samples a pixel in each pass (default: the preset's, else the scene's)")
       ->check(CLI::Range(1, 65536));
-  command.add_flag_function(  // a flag that is not given stays open
-      "--denoise,!--no-denoise", [&setup](int64_t count) { setup.denoise = count > 0; },
+  // Neither: as the preset has it.
+  auto* on = command.add_flag_callback(
+      "--denoise", [&setup] { setup.denoise = true; },
       "Filter noise by what the passes tell of it: layers denoised, denoised_error and denoising_*; the PNG is "
       "denoised. "
       "From two passes on");
+  command
+      .add_flag_callback(
+          "--no-denoise", [&setup] { setup.denoise = false; }, "Leave the filter out, where the preset has it")
+      ->excludes(on);
 }
 
 void apply_preset(const io::Api& api, FrameSetup& setup, bool plain) {
