@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include "io/file_error.h"
 #include "io/json_reader.h"
@@ -89,7 +90,7 @@ class Document {
   }
 
   void check_texture(JsonObject from, const char* key) const {
-    if (const auto texture = object(from, key)) {
+    if (const auto texture = object(std::move(from), key)) {
       index(*texture, "index", "textures");
       number(*texture, "scale");
       if (const auto extensions = object(*texture, "extensions"))
@@ -191,7 +192,7 @@ class Document {
     }
   }
 
-  static void check_light(JsonObject light) {
+  static void check_light(const JsonObject& light) {
     numbers(light, "color", 3, 0);
     number(light, "intensity", 0);
     if (const auto spot = object(light, "spot")) {
