@@ -1,6 +1,7 @@
 #include "film/denoise.h"
 
 #include <array>
+#include <atomic>
 #include <vector>
 
 #include "core/parallel.h"
@@ -62,7 +63,7 @@ class Denoiser {
       rows([&](size_t begin, size_t end) { atrous_rows(guide_, from_, size_t{1} << level, begin, end, to_); });
       std::swap(from_, to_);
       weigh_level();
-      choose_spread(level);
+      if (any_fireflies_) choose_spread(level);
     }
     spread_rare();
     write();
@@ -169,6 +170,7 @@ class Denoiser {
             if (!(l > most)) continue;
             const Rgb excess = bright * (1.0f - most / l);
             halves[half] -= excess, rare += excess;
+            any_fireflies_.store(true, std::memory_order_relaxed);
           }
       }
       const auto mean = [&](const Rgb& sum, float count) { return over(max(sum, Rgb{}), a) * (1.0f / count); };
@@ -203,6 +205,7 @@ class Denoiser {
       result_.row(kRareWidely, y)[x] = from_.row(kRare, y)[x];
       store(from_, 0, x, y, Rgb{});
     });
+    if (!any_fireflies_) return;
     for (size_t level = kLevels; level-- > 0;) {
       pixels([&](size_t x, size_t y) {
         if (spread_[y * width_ + x] == level + 1) store(from_, 0, x, y, read(from_, 0, x, y) + read(rare_, 0, x, y));
@@ -281,6 +284,7 @@ class Denoiser {
   PaddedPlanes result_;
   CoarsePlane wrong_, varies_;
   bool first_ = true;
+  std::atomic<bool> any_fireflies_{false};
 };
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include <cstring>
 #include <filesystem>
 #include <mutex>
+#include <optional>
 #include <random>
 #include <set>
 
@@ -243,27 +244,27 @@ int open_stream(const std::string& path, const fs::path& place) {
 }  // namespace
 
 void check_distinct(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs) {
-  std::set<fs::path> seen;
-  const auto is_new = [&](const std::string& path) {
-    if (path.empty()) return true;
+  // Nothing where there is no plain file: whoever writes there says so.
+  const auto place_of = [](const std::string& path) -> std::optional<fs::path> {
+    if (path.empty()) return {};
     Target target;
     try {
       target = find_target(path);
     } catch (const FileError&) {
-      return true;  // whoever writes there says so
+      return {};
     }
-    if (target.kind != Target::Kind::file) return true;
+    if (target.kind != Target::Kind::file) return {};
     std::error_code code;
     const fs::path place = fs::weakly_canonical(fs::absolute(target.path, code), code);
-    return seen.insert(code ? target.path : place).second;
+    return code ? target.path : place;
   };
+  std::set<fs::path> written;
   for (const std::string& path : outputs)
-    if (!is_new(path)) throw FileError(path, "is where two outputs shall be written");
-  const std::set<fs::path> written = seen;
-  for (const std::string& path : inputs) {
-    if (!is_new(path)) throw FileError(path, "is read, and an output shall not take its place");
-    seen = written;  // inputs may be named twice
-  }
+    if (const auto place = place_of(path); place && !written.insert(*place).second)
+      throw FileError(path, "is where two outputs shall be written");
+  for (const std::string& path : inputs)
+    if (const auto place = place_of(path); place && written.contains(*place))
+      throw FileError(path, "is read, and an output shall not take its place");
 }
 
 void check_writable(const std::string& path, uint64_t bytes) {

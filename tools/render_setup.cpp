@@ -49,8 +49,7 @@ void add_frame_options(CLI::App& command, FrameSetup& setup) {
   auto* on = command.add_flag_callback(
       "--denoise", [&setup] { setup.denoise = true; },
       "Filter noise by what the passes tell of it: layers denoised, denoised_error and denoising_*; the PNG is "
-      "denoised. "
-      "From two passes on");
+      "denoised. From two passes on");
   command
       .add_flag_callback(
           "--no-denoise", [&setup] { setup.denoise = false; }, "Leave the filter out, where the preset has it")
