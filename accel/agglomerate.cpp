@@ -8,6 +8,7 @@
 #include <hwy/highway.h>
 
 #include "accel/agglomerate-inl.h"
+#include "accel/agglomerate/area_policy-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lumicut {
@@ -15,38 +16,6 @@ namespace HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
-
-// d = half the surface area of the joint box. [Walter et al. 2008, sec. 4] Features: -lo, hi.
-struct AreaPolicy {
-  static constexpr bool kNonDecreasing = true;
-  static constexpr int kFeatures = 6;
-  static constexpr int kOrderDims = 3;
-  size_t features() const { return 6; }
-  size_t key_features() const { return 6; }
-  void merge(const float* a, const float* b, float* out) const {
-    for (int f = 0; f < 6; ++f) out[f] = std::max(a[f], b[f]);
-  }
-  void order_point(const float* a, float* point) const {
-    for (int axis = 0; axis < 3; ++axis) point[axis] = a[3 + axis] - a[axis];  // twice the centre
-  }
-  template <class D>
-  struct Query {
-    hn::Vec<D> f[6];
-  };
-  template <class D>
-  HWY_INLINE Query<D> query(D d, const float* a) const {
-    return {
-        {hn::Set(d, a[0]), hn::Set(d, a[1]), hn::Set(d, a[2]), hn::Set(d, a[3]), hn::Set(d, a[4]), hn::Set(d, a[5])}};
-  }
-  template <class D>
-  HWY_INLINE hn::Vec<D> cost(D d, const Query<D>& a, const float* b) const {
-    const auto x = hn::Add(hn::Max(a.f[0], hn::Load(d, b)), hn::Max(a.f[3], hn::Load(d, b + 24)));
-    const auto y = hn::Add(hn::Max(a.f[1], hn::Load(d, b + 8)), hn::Max(a.f[4], hn::Load(d, b + 32)));
-    const auto z = hn::Add(hn::Max(a.f[2], hn::Load(d, b + 16)), hn::Max(a.f[5], hn::Load(d, b + 40)));
-    return hn::Add(hn::Mul(x, hn::Add(y, z)), hn::Mul(y, z));
-  }
-};
-static_assert(agglomeration::ClusterPolicy<AreaPolicy>);
 
 // d = radius of the smallest ball around both: (|c1 - c2| + r1 + r2) / 2, or the greater radius where one ball contains
 // the other. [Omohundro 1989] Features: centre, -centre, radius. Unlike in other policies, features may decrease when
@@ -181,8 +150,8 @@ std::vector<Merge> caller(const Dissimilarity& by, std::span<const float> leaves
 
 std::vector<Merge> boxes(std::span<const Aabb> input, float scale, float inflate, Strategy strategy,
                          Progress* progress) {
-  const AreaPolicy policy;
-  agglomeration::Core<AreaPolicy> core(policy, input.size(), strategy == Strategy::parallel, progress);
+  const agglomeration::AreaPolicy policy;
+  agglomeration::Core<agglomeration::AreaPolicy> core(policy, input.size(), strategy == Strategy::parallel, progress);
   core.for_chunks(input.size(), 4096, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       float* f = core.leaf(i);

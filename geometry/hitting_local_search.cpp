@@ -10,6 +10,7 @@
 #include <unordered_map>
 
 #include "geometry/hitting_instance.h"
+#include "geometry/work_queue.h"
 
 namespace lumicut::hitting {
 namespace {
@@ -24,7 +25,7 @@ class Search {
         disk_stamp_(in.disk_id.size(), 0),
         disk_seen_(in.disk_id.size(), 0),
         point_stamp_(s.size(), 0),
-        queued_(s.size(), 0) {
+        queue_(s.size()) {
     for (uint32_t p = 0; p < s_.size(); ++p)
       if (s_[p])
         for (const uint32_t d : in_.disks_of[p]) ++hits_[d];
@@ -32,23 +33,15 @@ class Search {
 
   void run() {
     for (uint32_t p = 0; p < s_.size(); ++p)
-      if (s_[p]) enqueue(p);
-    for (size_t i = 0; i < queue_.size(); ++i) {
-      const uint32_t x = queue_[i];
-      queued_[x] = 0;
-      // Moves free others nearby: those are queued again by apply().
+      if (s_[p]) queue_.push(p);
+    // Moves free others nearby: those are queued again by apply().
+    queue_.run([&](uint32_t x) {
       while (s_[x] && improve_around(x)) {
       }
-    }
+    });
   }
 
  private:
-  void enqueue(uint32_t p) {
-    if (queued_[p]) return;
-    queued_[p] = 1;
-    queue_.push_back(p);
-  }
-
   // Points of the set that share a rarely hit disk with y (at most k hits).
   template <typename Fn>
   void owners(uint32_t y, Fn&& fn) const {
@@ -143,7 +136,7 @@ class Search {
     for (int i = 0; i < ny; ++i) {
       if (s_[y[i]]) continue;
       s_[y[i]] = 1;
-      enqueue(y[i]);
+      queue_.push(y[i]);
       for (const uint32_t d : in_.disks_of[y[i]]) ++hits_[d], touched_.push_back(d);
     }
     // Whoever owns, or links to an owner of, a disk whose count changed may have a move now.
@@ -152,8 +145,8 @@ class Search {
       for (const uint32_t p : in_.points_of[d]) {
         if (point_stamp_[p] == mark) continue;
         point_stamp_[p] = mark;
-        if (s_[p]) enqueue(p);
-        owners(p, [&](uint32_t z) { enqueue(z); });
+        if (s_[p]) queue_.push(p);
+        owners(p, [&](uint32_t z) { queue_.push(z); });
       }
     return true;
   }
@@ -222,8 +215,8 @@ class Search {
   const int k_;
   Solution& s_;
   std::vector<uint32_t> hits_, disk_stamp_, disk_seen_, point_stamp_;
-  std::vector<uint8_t> queued_;
-  std::vector<uint32_t> queue_, own_, near_, touched_;
+  WorkQueue queue_;
+  std::vector<uint32_t> own_, near_, touched_;
   std::vector<uint32_t> rest_[4];  // by room
   uint32_t stamp_ = 0;
 };

@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "geometry/balltree.h"
 #include "geometry/hitting_set.h"
+#include "geometry/work_queue.h"
 
 namespace lumicut {
 namespace {
@@ -31,7 +32,8 @@ class Search {
         if (j != i && dist2(d.centre, disks[j].centre) <= sum * sum) touching_[i].push_back(j);
       }
     }
-    chosen_.assign(disks.size(), 0), taken_.assign(disks.size(), 0), queued_.assign(disks.size(), 0);
+    chosen_.assign(disks.size(), 0), taken_.assign(disks.size(), 0);
+    queue_ = WorkQueue(disks.size());
     mark_.assign(disks.size(), 0);
   }
 
@@ -45,13 +47,11 @@ class Search {
     for (uint32_t d = 0; d < chosen_.size(); ++d)
       if (free(d)) choose(d);
     for (uint32_t d = 0; d < chosen_.size(); ++d)
-      if (chosen_[d]) enqueue(d);
-    for (size_t i = 0; i < queue_.size(); ++i) {
-      const uint32_t x = queue_[i];
-      queued_[x] = 0;
+      if (chosen_[d]) queue_.push(d);
+    queue_.run([&](uint32_t x) {
       while (chosen_[x] && improve_around(x)) {
       }
-    }
+    });
   }
 
   std::vector<uint32_t> result() const {
@@ -64,9 +64,6 @@ class Search {
   bool touches_chosen(uint32_t d) const { return taken_[d] > 0; }
 
  private:
-  void enqueue(uint32_t d) {
-    if (!queued_[d]) queued_[d] = 1, queue_.push_back(d);
-  }
   uint32_t most() const { return static_cast<uint32_t>(exchange_ - 1); }
 
   std::vector<uint32_t> links(uint32_t x) {
@@ -108,17 +105,17 @@ class Search {
     for (const uint32_t c : outside)
       if (free(c)) choose(c), picked.push_back(c);
     // New moves need a disk whose count changed, and start at the chosen ones it touches.
-    for (const uint32_t c : picked) enqueue(c), enqueue_near(c);
+    for (const uint32_t c : picked) queue_.push(c), enqueue_near(c);
     for (const uint32_t c : x) enqueue_near(c);
     return true;
   }
   void enqueue_near(uint32_t c) {
     for (const uint32_t y : touching_[c]) {
       if (chosen_[y])
-        enqueue(y);
+        queue_.push(y);
       else
         for (const uint32_t z : touching_[y])
-          if (chosen_[z]) enqueue(z);
+          if (chosen_[z]) queue_.push(z);
     }
   }
 
@@ -159,9 +156,10 @@ class Search {
 
   const int exchange_;
   std::vector<std::vector<uint32_t>> touching_;  // ascending, without itself
-  std::vector<uint8_t> chosen_, queued_;
+  std::vector<uint8_t> chosen_;
   std::vector<uint32_t> taken_;  // by disk: chosen ones that it touches
-  std::vector<uint32_t> mark_, queue_;
+  std::vector<uint32_t> mark_;
+  WorkQueue queue_;
   uint32_t stamp_ = 0;
 };
 

@@ -20,6 +20,7 @@
 #include <hwy/highway.h>
 
 #include "accel/agglomerate-inl.h"
+#include "accel/agglomerate/area_policy-inl.h"
 
 #ifndef LUMICUT_BENCH_BVH_SCHEDULE
 #define LUMICUT_BENCH_BVH_SCHEDULE
@@ -118,44 +119,22 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// The policy of boxes (accel/agglomerate.cpp), which counts.
-struct CountedBoxes {
-  static constexpr bool kNonDecreasing = true;
-  static constexpr int kFeatures = 6;
-  static constexpr int kOrderDims = 3;
+// The policy of boxes, which counts.
+struct CountedBoxes : agglomeration::AreaPolicy {
+  explicit CountedBoxes(bench::Schedule* counts) : to(counts) {}
   bench::Schedule* to;
   bench::Schedule& schedule() const { return *to; }
-  size_t features() const { return 6; }
-  size_t key_features() const { return 6; }
-  void merge(const float* a, const float* b, float* out) const {
-    for (int f = 0; f < 6; ++f) out[f] = std::max(a[f], b[f]);
-  }
-  void order_point(const float* a, float* point) const {
-    for (int axis = 0; axis < 3; ++axis) point[axis] = a[3 + axis] - a[axis];
-  }
-  template <class D>
-  struct Query {
-    hn::Vec<D> f[6];
-  };
-  template <class D>
-  HWY_INLINE Query<D> query(D d, const float* a) const {
-    return {
-        {hn::Set(d, a[0]), hn::Set(d, a[1]), hn::Set(d, a[2]), hn::Set(d, a[3]), hn::Set(d, a[4]), hn::Set(d, a[5])}};
-  }
   template <class D>
   HWY_INLINE hn::Vec<D> cost(D d, const Query<D>& a, const float* b) const {
     to->blocks += hn::Lanes(d);
-    const auto x = hn::Add(hn::Max(a.f[0], hn::Load(d, b)), hn::Max(a.f[3], hn::Load(d, b + 24)));
-    const auto y = hn::Add(hn::Max(a.f[1], hn::Load(d, b + 8)), hn::Max(a.f[4], hn::Load(d, b + 32)));
-    const auto z = hn::Add(hn::Max(a.f[2], hn::Load(d, b + 16)), hn::Max(a.f[5], hn::Load(d, b + 40)));
-    return hn::Add(hn::Mul(x, hn::Add(y, z)), hn::Mul(y, z));
+    return AreaPolicy::cost(d, a, b);
   }
 };
 static_assert(agglomeration::ClusterPolicy<CountedBoxes>);
 
 bench::Layout lay_out(std::span<const Aabb> boxes) {
   bench::Schedule schedule;
-  const CountedBoxes policy{&schedule};
+  const CountedBoxes policy(&schedule);
   agglomeration::Core<CountedBoxes> core(policy, boxes.size(), false, nullptr);
   schedule.start();
   core.for_chunks(boxes.size(), 4096, [&](size_t begin, size_t end) {
