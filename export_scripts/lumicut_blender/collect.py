@@ -555,8 +555,6 @@ class Collector:
         light.receivers, light.blockers = links.receivers, links.blockers
 
     def _check_flags(self, ob):
-        if ob.is_shadow_catcher and self.depsgraph.mode == "VIEWPORT":
-            self.report.note(ob.name, "Shadow catchers taken as ordinary objects in the viewport")
         of_cycles = getattr(self.depsgraph.scene, "cycles", None)
         if getattr(of_cycles, "feature_set", "") == "EXPERIMENTAL" and getattr(getattr(ob, "cycles", None), "use_adaptive_subdivision", False):
             self.report.note(ob.name, "Adaptive subdivision, taken as the modifier's levels")

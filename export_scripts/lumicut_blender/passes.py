@@ -259,18 +259,15 @@ class Filler:
         return shadow_catcher.shade(whole, objects, clean, 1 if "world" in self._caught else self.channel("alpha"))
 
     def _with_caught_shadows(self):
-        objects = self._caught["objects"]
-        colour, alpha, opaque = objects["denoised" if self._denoised else "radiance"], objects["alpha"], \
-            not self.scene.render.film_transparent
-        behind = self._caught["world"]["radiance"] if "world" in self._caught else \
-            self._backdrop(self.camera, self.tile) if opaque and self._backdrop is not None else 0
+        objects, opaque = self._caught["objects"], not self.scene.render.film_transparent
+        channel = "denoised" if self._denoised else "radiance"
+        behind = self._backdrop(self.camera, self.tile) if opaque and self._backdrop is not None else 0
         if self._shadows_apart:  # the catchers are holes, to be laid over the pass of their shadows
             missed = (1 - self.channel("alpha")) if opaque else 0
-            colour, alpha = colour + behind * missed, alpha + missed
+            behind = self._caught["world"]["radiance"] if "world" in self._caught else behind
+            colour, alpha = objects[channel] + behind * missed, objects["alpha"] + missed
         else:
-            alpha = shadow_catcher.alpha(alpha, self.shadow_catcher())
-            if opaque:
-                colour, alpha = colour + behind * (1 - alpha), np.ones_like(alpha)
+            colour, alpha = shadow_catcher.over(self.channel("radiance"), self.channel("alpha"), self._caught, behind, opaque, channel)
         return np.concatenate([colour * np.float32(self._exposure), alpha], -1, dtype=np.float32)
 
     def noisy(self):

@@ -63,3 +63,14 @@ def shade(whole, objects, clean, cover):
 def alpha(objects_cover, left):
     """Of the image: objects, and shadows beside them."""
     return objects_cover + (1 - objects_cover) * (1 - np.clip(left.mean(-1, keepdims=True), 0, 1))
+
+
+def over(whole, cover, caught, behind, opaque, channel="radiance"):
+    """(colour, alpha) of the image with the catchers' shadows. `whole`, `cover`: radiance and alpha of the whole scene;
+    `caught`: {name: {channel: pixels}} of the scenes beside it; `behind`: what the camera sees behind all, where the film is
+    `opaque` and no scene "world" shows it; `channel`: which of a frame's images is wanted."""
+    left = shade(whole, caught["objects"]["radiance"], caught["clean"]["radiance"], 1 if "world" in caught else cover)
+    colour, covered = caught["objects"][channel], alpha(caught["objects"]["alpha"], left)
+    if not opaque:
+        return colour, covered
+    return colour + (caught["world"]["radiance"] if "world" in caught else behind) * (1 - covered), np.ones_like(covered)

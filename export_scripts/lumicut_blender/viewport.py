@@ -14,7 +14,7 @@ import gpu
 import numpy as np
 from gpu_extras.presets import draw_texture_2d
 
-from . import cameras, collect, passes, properties, runtime, sky
+from . import cameras, collect, passes, properties, runtime, shadow_catcher, sky
 from .lumicut import library
 from .images import Images
 from .report import Report
@@ -181,7 +181,7 @@ class Session:
                 self.running = None
 
     def _work(self):
-        scene, integrators = None, {}
+        scenes, integrators = {}, {}  # "": the whole scene; those that shadow catchers need beside it
         pending = None  # scene data that was not yet uploaded when a newer view came
         while True:
             with self.condition:
@@ -196,14 +196,17 @@ class Session:
                 device = runtime.device(settings["threads"])
                 if pending is not None:
                     self.message = "building"
-                    fresh = library.Scene(device, **settings["tracing"])
                     pending.camera = camera
-                    pending.upload(fresh, self._raise_if_cancelled)
-                    self._guarded(fresh, fresh.commit)
-                    scene, integrators, pending = fresh, {}, None
-                scene.set_camera(camera)
-                self._guarded(scene, scene.commit)
-                self._render_levels(device, scene, integrators, size, settings, camera)
+                    parts = {"": pending} | (shadow_catcher.scenes(pending) if shadow_catcher.is_needed(pending) else {})
+                    fresh = {name: library.Scene(device, **settings["tracing"]) for name in parts}
+                    for name, part in parts.items():
+                        part.upload(fresh[name], self._raise_if_cancelled)
+                        self._guarded(fresh[name], fresh[name].commit)
+                    scenes, integrators, pending = fresh, {}, None
+                for scene in scenes.values():
+                    scene.set_camera(camera)
+                    self._guarded(scene, scene.commit)
+                self._render_levels(device, scenes, integrators, size, settings, camera)
                 self.message = "done"
             except library.Cancelled:
                 continue
@@ -217,42 +220,60 @@ class Session:
         if self._cancelled():
             raise library.Cancelled(library.CANCELLED, "a newer view waits")
 
-    def _render_levels(self, device, scene, integrators, size, settings, camera):
-        for number, (divisor, name, values) in enumerate(settings["levels"]):
-            key = (name, tuple(sorted(values.items())))
+    def _render_levels(self, device, scenes, integrators, size, settings, camera):
+        def start(part, name, values, pixels, **options):
+            key = (part, name, tuple(sorted(values.items())))
             if key not in integrators:
                 integrator = library.Integrator(device, name)
                 for parameter, value in values.items():
                     integrator.set(parameter, value)
                 integrators[key] = integrator
-            width, height = max(1, size[0] // divisor), max(1, size[1] // divisor)
-            self.message = f"{width} x {height}"
-            final = divisor == 1
-            denoise = final and settings["denoise"]
-            options = settings["final"] | {"flags": library.DENOISE if denoise else 0} if final else {}
-            with library.Render(integrators[key], scene, width, height, **options) as render:
-                self._guarded(render, lambda: self._follow(render, settings, camera))
-                self._show(render, settings, camera, "denoised" if denoise else "radiance")
+            return library.Render(integrators[key], scenes[part], *pixels, **options)
+
+        beside = [part for part in scenes if part]
+        for number, (divisor, name, values) in enumerate(settings["levels"]):
+            pixels = max(1, size[0] // divisor), max(1, size[1] // divisor)
+            self.message = f"{pixels[0]} x {pixels[1]}"
+            rounds = [{"flags": 0}]
+            if divisor == 1:
+                # Pictures of scenes beside each other come when all of them are done: one pass of each before the rest.
+                rounds = ([{"flags": 0}] if beside and settings["final"]["passes"] != 1 else []) \
+                    + [settings["final"] | {"flags": library.DENOISE if settings["denoise"] else 0}]
+            for options in rounds:
+                channel = "denoised" if options["flags"] else "radiance"
+                with start("", name, values, pixels, **options) as render:
+                    done = self._guarded(render, lambda: self._follow(render, settings, camera, not beside))
+                    caught = {}
+                    for part in beside:  # of the same samples
+                        with start(part, name, values, pixels, passes=max(1, done.passes_done), flags=options["flags"]) as other:
+                            self._guarded(other, lambda: self._follow(other, settings, camera, False))
+                            caught[part] = {image: other.read(image) for image in {"radiance", "alpha", channel}}
+                    self._show(render, settings, camera, channel, caught)
             self.levels_done = number + 1
 
-    def _follow(self, render, settings, camera):
-        """Waits for the end; meanwhile shows the mean of the passes so far."""
+    def _follow(self, render, settings, camera, show):
+        """Waits for the end, and gives the last status; meanwhile shows the mean of the passes so far, where it is to `show`."""
         shown, passes_shown = time.perf_counter(), 0
         while (status := render.wait(POLL_MS)).state == library.RUNNING:
             if status.passes_total == 1 or status.passes_done == 0:
                 continue
             self.message = f"iteration {status.passes_done + 1}" + (f"/{status.passes_total}" if status.passes_total else "")
-            if status.passes_done > passes_shown and time.perf_counter() > shown + SHOW_SECONDS:
+            if show and status.passes_done > passes_shown and time.perf_counter() > shown + SHOW_SECONDS:
                 self._show(render, settings, camera, "radiance")
                 shown, passes_shown = time.perf_counter(), status.passes_done
+        return status
 
-    def _show(self, render, settings, camera, channel):
+    def _show(self, render, settings, camera, channel, caught=None):
+        """`caught`: of the scenes that shadow catchers need [shadow_catcher.py], where there are any."""
         data = self.data
         radiance, alpha = render.read(channel), render.read("alpha")
         height, width = radiance.shape[:2]
         picture = np.ones((height, width, 4), np.float32)
-        if data.backdrop is not None:
-            radiance = radiance + (1 - alpha) * data.backdrop.seen(camera, width, height, (0, 0, width, height))
+        behind = data.backdrop.seen(camera, width, height, (0, 0, width, height)) if data.backdrop is not None else 0
+        if caught:
+            radiance, alpha = shadow_catcher.over(render.read("radiance"), alpha, caught, behind, not data.transparent, channel)
+        elif data.backdrop is not None:
+            radiance = radiance + (1 - alpha) * behind
         picture[..., :3] = radiance[::-1] * settings["exposure"]
         if data.transparent:
             picture[..., 3] = alpha[::-1, :, 0]

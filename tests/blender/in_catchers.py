@@ -1,4 +1,6 @@
 """Shadow catchers beside Cycles: transparent and opaque films, lamps that are of the footage and such that are not."""
+import threading
+import time
 import unittest
 
 import bpy
@@ -79,3 +81,29 @@ class Catchers(unittest.TestCase):
             ours = h.render()
         a, b = (h.blocks(image["Combined"]) for image in (ours, theirs))
         np.testing.assert_allclose(a.mean((0, 1)), b.mean((0, 1)), atol=0.01)
+
+    def test_views_show_them_as_f12_does(self):
+        from lumicut_blender import cameras, collect, report, viewport
+        self.scene.cycles.pixel_filter_type = "BOX"  # as views have it
+        settings = self.scene.lumicut
+        for transparent in (True, False):
+            with self.subTest(transparent=transparent):
+                self.scene.render.film_transparent = transparent
+                with h.quiet():
+                    h.set_lumicut("lightcuts", 1, passes=4, vpls=1000)
+                    settings.viewport_passes, settings.viewport_lights, settings.denoise_viewport = 4, 1000, False
+                    f12 = h.render()["Combined"]
+                depsgraph = bpy.context.evaluated_depsgraph_get()
+                owner = threading.Event()  # any object: nothing is drawn
+                session = viewport.Session(owner)
+                self.addCleanup(session.close, True)
+                session.settings = session._settings(settings)
+                session.data = collect.Collector(depsgraph, report.Report(), cache=session.cache).collect()
+                camera = cameras.convert_camera(self.scene.camera, self.scene, report.Report())
+                session._ask(session.data, camera, (40, 40))
+                end = time.monotonic() + 60
+                while session.message != "done" and not session.message.startswith("failed") and time.monotonic() < end:
+                    time.sleep(0.05)
+                self.assertEqual(session.message, "done")
+                view = session.picture[::-1]
+                np.testing.assert_allclose(h.blocks(view), h.blocks(f12), atol=1e-3)  # passes of the same seed
