@@ -24,6 +24,9 @@ Material glass(float roughness, float ior = 1.5f, const Rgb& base = {1, 1, 1}) {
 struct OneSurface {
   explicit OneSurface(const Material& m) {
     scene.set_materials({m});
+    Mesh mesh;  // that the hit is of
+    test::add_quad(mesh, {0, 0, 3}, {2, 0, 3}, {2, 4, 3}, {0, 4, 3}, 0);
+    scene.add_mesh(mesh);
     hit.position = {1, 2, 3}, hit.offset = 1e-5f, hit.geometric_normal = hit.normal = {0, 0, 1};
   }
   Bsdf bsdf(const Vec3f& to_viewer) const { return scene.interaction(hit, to_viewer).bsdf; }
