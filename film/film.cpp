@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "core/current_work.h"
 #include "core/error.h"
 
 namespace lumicut {
@@ -47,11 +48,14 @@ uint64_t film_pixel_bytes(size_t groups, bool denoised) {
 
 Film::Film(Rect crop, std::vector<uint32_t> groups, bool denoised) : crop_(crop), groups_(std::move(groups)) {
   const size_t pixels = size_t{crop.width()} * crop.height();
+  const auto clear = [&](std::vector<float>& plane, size_t components) {
+    if (const Progress* work = CurrentWork::progress()) work->check();  // a plane may have hundreds of megabytes
+    plane.assign(pixels * components, 0.0f);
+  };
   for (const ChannelInfo& c : channel_table())
-    if (denoised || !of_denoising(c.channel))
-      planes_[static_cast<size_t>(c.channel)].assign(pixels * c.components, 0.0f);
+    if (denoised || !of_denoising(c.channel)) clear(planes_[static_cast<size_t>(c.channel)], c.components);
   group_planes_.resize(groups_.size());
-  for (std::vector<float>& plane : group_planes_) plane.assign(3 * pixels, 0.0f);
+  for (std::vector<float>& plane : group_planes_) clear(plane, 3);
 }
 
 template <typename Planes, typename Groups, typename Fn>

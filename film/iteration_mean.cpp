@@ -5,6 +5,8 @@
 #include <cstring>
 #include <limits>
 
+#include "core/parallel.h"
+
 namespace lumicut {
 
 double student_t(double confidence, uint64_t n) {
@@ -61,15 +63,19 @@ void IterationMean::write_error(uint64_t passes, Film& mean) const {
   if (passes < 2) return;
   const auto n = static_cast<double>(passes);
   const double t = student_t(confidence_, passes);
-  for (uint32_t y = crop_.y0; y < crop_.y1; ++y)
-    for (uint32_t x = crop_.x0; x < crop_.x1; ++x) {
-      double sum = 0.0;
-      int count = 0;
-      for (uint32_t v = std::max(crop_.y0 + 1, y) - 1; v < std::min(crop_.y1, y + 2); ++v)
-        for (uint32_t u = std::max(crop_.x0 + 1, x) - 1; u < std::min(crop_.x1, x + 2); ++u, ++count)
-          sum += sums_[index(u, v)].squares;
-      mean.set(Channel::error, x, y, static_cast<float>(t * std::sqrt(std::max(0.0, sum / count) / (n * (n - 1.0)))));
-    }
+  constexpr size_t kRows = 16;
+  parallel_chunks(crop_.height(), kRows, [&](size_t begin, size_t end) {
+    for (uint32_t y = crop_.y0 + begin; y < crop_.y0 + end; ++y)
+      for (uint32_t x = crop_.x0; x < crop_.x1; ++x) {
+        double sum = 0.0;
+        int count = 0;
+        for (uint32_t v = std::max(crop_.y0 + 1, y) - 1; v < std::min(crop_.y1, y + 2); ++v)
+          for (uint32_t u = std::max(crop_.x0 + 1, x) - 1; u < std::min(crop_.x1, x + 2); ++u, ++count)
+            sum += sums_[index(u, v)].squares;
+        const double variance = std::max(0.0, sum / count) / (n * (n - 1.0));
+        mean.set(Channel::error, x, y, static_cast<float>(t * std::sqrt(variance)));
+      }
+  });
 }
 
 double IterationMean::error(const Film& mean, uint64_t passes) const {

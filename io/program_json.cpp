@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstring>
 #include <optional>
@@ -14,12 +15,26 @@ namespace lumicut::io {
 
 namespace {
 
+struct Op {
+  std::string name;
+  uint32_t inputs, modes;
+};
+
 // In the order of LUMICUT_OP_...
-const std::vector<std::string> kOps = {
-    "uv",     "attribute", "position", "normal",  "to_viewer", "behind",      "camera",  "transform", "math",
-    "vector", "grey",      "separate", "combine", "clamp",     "map_range",   "mapping", "rotate",    "mix",
-    "color",  "ramp",      "curves",   "fresnel", "bump",      "normal_map",  "noise",   "musgrave",  "voronoi",
-    "wave",   "magic",     "brick",    "checker", "gradient",  "white_noise", "project", "image"};
+const std::vector<Op> kOps = {
+    {"uv", 0, 1},        {"attribute", 0, 2}, {"position", 0, 1},    {"normal", 0, 2},     {"to_viewer", 0, 1},
+    {"behind", 0, 1},    {"camera", 0, 4},    {"transform", 1, 3},   {"math", 3, 41},      {"vector", 3, 27},
+    {"grey", 1, 2},      {"separate", 1, 3},  {"combine", 3, 1},     {"clamp", 3, 2},      {"map_range", 6, 16},
+    {"mapping", 4, 4},   {"rotate", 4, 10},   {"mix", 3, 19},        {"color", 4, 7},      {"ramp", 1, 2},
+    {"curves", 2, 2},    {"fresnel", 2, 3},   {"bump", 4, 1},        {"normal_map", 2, 2}, {"noise", 8, 80},
+    {"musgrave", 7, 20}, {"voronoi", 5, 320}, {"wave", 6, 24},       {"magic", 2, 11},     {"brick", 6, 1},
+    {"checker", 1, 1},   {"gradient", 1, 7},  {"white_noise", 2, 8}, {"project", 1, 4},    {"image", 3, 8}};
+
+std::vector<std::string> names_of_ops() {
+  std::vector<std::string> names;
+  for (const Op& op : kOps) names.push_back(op.name);
+  return names;
+}
 
 constexpr double kLargest = 3e38;
 
@@ -38,13 +53,18 @@ class ProgramReader {
   void instruction(const JsonValue& value) {
     JsonObject object(value);
     lumicut_instruction out{};
-    out.op = static_cast<uint32_t>(object.need("op").choice(kOps));
-    out.mode = static_cast<uint32_t>(object.integer("mode", 0, 0, 1 << 20));
+    static const std::vector<std::string> names = names_of_ops();
+    out.op = static_cast<uint32_t>(object.need("op").choice(names));
+    const Op& op = kOps[out.op];
+    out.mode = static_cast<uint32_t>(object.integer("mode", 0, 0, int64_t{op.modes} - 1));
+    size_t given = 0;
     if (auto inputs = object.find("inputs")) {
       const auto elements = inputs->elements();
-      if (elements.size() > std::size(out.inputs)) inputs->fail_expected("an array of at most 8");
-      for (size_t i = 0; i < elements.size(); ++i) out.inputs[i] = input(elements[i]);
+      if (elements.size() > op.inputs)
+        inputs->fail_expected(fmt::format("an array of at most {}, the inputs of {}", op.inputs, op.name));
+      for (const auto& element : elements) out.inputs[given++] = input(element);
     }
+    while (given < op.inputs) out.inputs[given++] = constant({});
     if (auto table = object.find("table")) {
       out.data = static_cast<uint32_t>(program_.table.size());
       for (const auto& number : table->elements())
@@ -72,7 +92,12 @@ class ProgramReader {
     const size_t n = value.raw().size();
     if (n != 1 && n != 3) value.fail_expected("an instruction's number, or an array of one number or three");
     const auto given = value.numbers(n, -kLargest, kLargest);
-    for (size_t k = 0; k < 3; ++k) program_.constants.push_back(static_cast<float>(given[n == 1 ? 0 : k]));
+    return constant({static_cast<float>(given[0]), static_cast<float>(given[n == 1 ? 0 : 1]),
+                     static_cast<float>(given[n == 1 ? 0 : 2])});
+  }
+
+  int32_t constant(const std::array<float, 3>& value) {
+    program_.constants.insert(program_.constants.end(), value.begin(), value.end());
     return -static_cast<int32_t>(program_.constants.size() / 3);
   }
 
@@ -104,11 +129,10 @@ nlohmann::ordered_json program_json(const Program& program, const std::function<
   using Json = nlohmann::ordered_json;
   Json steps = Json::array();
   for (const lumicut_instruction& from : program.instructions) {
-    Json step{{"op", kOps.at(from.op)}};
+    const Op& op = kOps.at(from.op);
+    Json step{{"op", op.name}};
     if (from.mode != 0) step["mode"] = from.mode;
-    size_t inputs = std::size(from.inputs);
-    while (inputs > 0 && from.inputs[inputs - 1] == 0) --inputs;  // the first step, or none
-    for (size_t i = 0; i < inputs; ++i) {
+    for (size_t i = 0; i < op.inputs; ++i) {
       const int32_t input = from.inputs[i];
       if (input >= 0) {
         step["inputs"].push_back(input);

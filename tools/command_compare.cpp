@@ -177,16 +177,20 @@ void add_compare(CLI::App& app) {
   command->add_option("image", o->image, "The image to judge: any format that OpenImageIO reads")->required();
   command->add_option("reference", o->reference, "The image that counts as right")->required();
   command->add_flag("--json", o->json, "Print JSON instead of text");
-  command->add_option("--error-image", o->error_image, "Write a grey PNG of the differences");
+  command->add_option("--error-image", o->error_image, "Write a grey PNG of the differences")
+      ->check(picture_of({".png"}));
   command->add_option("--scale", o->scale, "Factor of the differences in that image")
       ->capture_default_str()
       ->check(number_in(1e-30, 1e30));
-  command->add_option("--flip-image", o->flip_image, "Write a grey PNG of FLIP");
-  command->add_option(
-      "--error-map", o->error_map,
-      "Write each pixel's relative error: false colour with a log colour bar (PNG), or the numbers (EXR)");
-  command->add_option("--signed-error-map", o->signed_error_map,
-                      "The same with its sign: red is too bright, blue too dark");
+  command->add_option("--flip-image", o->flip_image, "Write a grey PNG of FLIP")->check(picture_of({".png"}));
+  command
+      ->add_option("--error-map", o->error_map,
+                   "Write each pixel's relative error: false colour with a log colour bar (PNG), or the numbers (EXR)")
+      ->check(picture_of({".png", ".exr"}));
+  command
+      ->add_option("--signed-error-map", o->signed_error_map,
+                   "The same with its sign: red is too bright, blue too dark")
+      ->check(picture_of({".png", ".exr"}));
   command
       ->add_option("--error-map-top", o->error_map_top,
                    "Relative error at the colour bar's top (default: 1; of signed maps the 99th percentile, rounded)")
@@ -204,7 +208,8 @@ void add_compare(CLI::App& app) {
   command->add_flag("--no-flip", o->no_flip, "Do without FLIP, the slowest measure");
   command->add_flag("--hdr-flip", o->hdr_flip,
                     "HDR-FLIP too: FLIP's greatest over all exposures; takes several times as long");
-  command->add_option("--hdr-flip-image", o->hdr_flip_image, "Write a grey PNG of HDR-FLIP");
+  command->add_option("--hdr-flip-image", o->hdr_flip_image, "Write a grey PNG of HDR-FLIP")
+      ->check(picture_of({".png"}));
   command->callback([o] { compare(*o); });
 }
 

@@ -278,8 +278,9 @@ void add_flythrough(CLI::App& app) {
   command->add_option("scene", o->scene, kSceneHelp)->required();
   command->add_option("cameras", o->cameras, "Cameras, JSON: docs/command_line.md")->required();
   add_setup_options(*command, *o);
-  command->add_option("-o,--output", o->output, "EXR to write for each view: a.exr becomes a.0000.exr, ...");
-  command->add_option("--png", o->png, "PNG to write for each view");
+  command->add_option("-o,--output", o->output, "EXR to write for each view: a.exr becomes a.0000.exr, ...")
+      ->check(picture_of({".exr"}));
+  command->add_option("--png", o->png, "PNG to write for each view")->check(picture_of({".png"}));
   command->add_option("--exposure", o->exposure, "Factor from radiance to [0,1] for the PNGs (default: each its own)")
       ->check(number_in(0, 1e30));
   command->add_option("--save-state", o->save_state, "File for what was prepared, to be loaded in later runs");

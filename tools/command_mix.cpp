@@ -96,7 +96,7 @@ void add_mix(CLI::App& app) {
   command->add_option("--others", o->others, "Factor of the groups that --gain does not name")
       ->capture_default_str()
       ->check(number_in(0, 1e30));
-  command->add_option("-o,--output", o->output, "EXR to write");
+  command->add_option("-o,--output", o->output, "EXR to write")->check(picture_of({".exr"}));
   add_png_options(*command, o->png, o->exposure);
   command->add_flag("--half", o->half, "16 bits a number in the EXR instead of 32");
   command->footer("Example: lumicut mix room.exr --gain 1=0 --gain 2=1,0.8,0.6 -o evening.exr --png evening.png");

@@ -512,7 +512,7 @@ void add_render(CLI::App& app) {
   const auto o = std::make_shared<Options>();
   command->add_option("scene", o->scene, kSceneHelp)->required();
   add_frame_options(*command, *o);
-  command->add_option("-o,--output", o->output, "EXR to write");
+  command->add_option("-o,--output", o->output, "EXR to write")->check(picture_of({".exr"}));
   add_png_options(*command, o->png, o->exposure);
   command->add_option(
       "--layers", o->layers,

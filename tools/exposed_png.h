@@ -12,7 +12,7 @@ namespace lumicut::tools {
 
 // --png and --exposure.
 inline void add_png_options(CLI::App& command, std::string& png, float& exposure) {
-  command.add_option("--png", png, "PNG to write too: exposed, cut to [0,1], sRGB");
+  command.add_option("--png", png, "PNG to write too: exposed, cut to [0,1], sRGB")->check(picture_of({".png"}));
   command
       .add_option("--exposure", exposure, "Factor from radiance to [0,1] for the PNG (default: 0.18 / geometric mean)")
       ->check(number_in(0, 1e30));

@@ -11,6 +11,7 @@
 
 #include "io/atomic_file.h"
 #include "io/file_error.h"
+#include "io/picture_ending.h"
 #include "io/scene_file.h"
 #include "lumicut/lumicut_presets.h"
 #include "tools/commands.h"
@@ -42,7 +43,8 @@ void add_frame_options(CLI::App& command, FrameSetup& setup) {
           "--preset", setup.preset,
           "draft, good, final or reference: integrator, parameters, samples, passes and denoising at once, where "
           "other options do not say otherwise (default: good, unless -i, -p or --vpls is given)")
-      ->excludes("--integrator");
+      ->excludes("--integrator")
+      ->check([](const std::string& name) { return name.empty() ? "no preset has an empty name" : std::string(); });
   command.add_option("--spp", setup.samples, "Samples a pixel in each pass (default: the preset's, else the scene's)")
       ->check(CLI::Range(1, 65536));
   // Neither: as the preset has it.
@@ -149,6 +151,10 @@ CLI::Validator number_in(double low, double high) {
             return fmt::format("{} is no number from {:g} to {:g}", text, low, high);
           },
           fmt::format("FLOAT in [{:g} - {:g}]", low, high)};
+}
+
+CLI::Validator picture_of(std::initializer_list<std::string_view> kinds) {
+  return {[kinds = std::vector(kinds)](std::string& path) { return io::wrong_picture_ending(path, kinds); }, ""};
 }
 
 std::vector<uint32_t> image_size(const std::string& text) {

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "io/library.h"
@@ -78,6 +80,8 @@ void check_groups(const io::Api& api, const RenderSetup& setup, bool groups);
 
 // For options of numbers: from `low` to `high`, and no NaN (which CLI::Range lets pass).
 CLI::Validator number_in(double low, double high);
+// For options of pictures of one of these kinds (".exr"): no name that ends as another kind does.
+CLI::Validator picture_of(std::initializer_list<std::string_view> kinds);
 
 // --size: "512x384" -> {512, 384}, each 1 to 65536. Throws UsageError.
 std::vector<uint32_t> image_size(const std::string& text);

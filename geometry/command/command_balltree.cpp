@@ -80,7 +80,7 @@ std::string draw(const Arguments& a, const BallTree& tree, const Balls& balls) {
   });
   if (balls.radii.empty())
     for (size_t i = 0; i < balls.size(); ++i) points.push_back({balls.centres[2 * i], balls.centres[2 * i + 1]});
-  return draw_circles(a.picture.ends_with(".svg"), points, circles, {}, a.size);
+  return draw_circles(as_svg(a.picture), points, circles, {}, a.size);
 }
 
 int run(const Arguments& a) {

@@ -103,8 +103,7 @@ int run(const Arguments& a) {
                of_disks ? disks.size() : ranges.offsets.size() - 1, of_disks ? "disks" : "ranges",
                seconds_since(start));
   write_points(a.out, points, chosen);
-  if (!a.picture.empty())
-    write_text(a.picture, draw_hitting_set(a.picture.ends_with(".svg"), points, disks, chosen, a.size));
+  if (!a.picture.empty()) write_text(a.picture, draw_hitting_set(as_svg(a.picture), points, disks, chosen, a.size));
   return 0;
 }
 

@@ -64,7 +64,7 @@ std::string draw(const Arguments& a, const std::deque<Point2>& window, const Dyn
   std::vector<Point2> corners;
   hull.for_each_hull_vertex([&](const Point2& p) { corners.push_back(p); });
   const std::vector<Point2> chain(window.begin(), window.end());
-  return draw_circles(a.picture.ends_with(".svg"), {}, {}, {}, a.size, chain, corners);
+  return draw_circles(as_svg(a.picture), {}, {}, {}, a.size, chain, corners);
 }
 
 int run(const Arguments& a) {

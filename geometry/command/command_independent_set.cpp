@@ -39,7 +39,7 @@ int run(const Arguments& a) {
   std::vector<Circle> circles;
   for (const Disk& d : disks) circles.push_back({d, {200, 210, 220}});
   for (const uint32_t i : chosen) circles.push_back({disks[i], {208, 32, 32}});
-  write_text(a.picture, draw_circles(a.picture.ends_with(".svg"), {}, circles, {}, a.size));
+  write_text(a.picture, draw_circles(as_svg(a.picture), {}, circles, {}, a.size));
   return 0;
 }
 

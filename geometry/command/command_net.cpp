@@ -50,8 +50,7 @@ int run(const Arguments& a) {
       n.points.size(), static_cast<double>(n.points.size()) * a.epsilon, n.sample,
       heaviest_unhit_disk(points, weights, n.points), whole);
   write_points(a.out, points, n.points);
-  if (!a.picture.empty())
-    write_text(a.picture, draw_hitting_set(a.picture.ends_with(".svg"), points, {}, n.points, a.size));
+  if (!a.picture.empty()) write_text(a.picture, draw_hitting_set(as_svg(a.picture), points, {}, n.points, a.size));
   return 0;
 #else
   (void)a;

@@ -244,7 +244,7 @@ Command add_recluster(CLI::App& app) {
   command->add_flag("--simply-connected", a->tree.simply_connected,
                     "Of the tree: refuses changes that make clusters other than discs");
   command->add_option("--atlas", a->atlas, "OBJ with texture coordinates: a chart for each cluster of the last frame");
-  command->add_option("--atlas-picture", a->atlas_picture, "PNG of its charts, as high as --height");
+  add_picture_option(*command, "--atlas-picture", a->atlas_picture, "PNG of its charts, as high as --height", {".png"});
   command->add_option("--gap", a->gap, "Between charts, in parts of the texture")->check(CLI::Range(0.0, 0.1));
   command->add_flag("--boxes", a->boxes, "Also a CSV of each frame's clusters' bounding boxes");
   command->add_option("--reach", a->reach, "Of the deformation, in diagonals")->check(CLI::Range(1e-6, 100.0));

@@ -4,8 +4,10 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <functional>
+#include <initializer_list>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "geometry/point2.h"
@@ -27,6 +29,9 @@ std::istringstream open_text(const std::string& path);
 // Refuses a place that cannot be written, before any work. "-" is standard output, "" is none.
 void check_output(const std::string& path);
 void write_text(const std::string& path, const std::string& text);
+// Refuses names that end as another kind of picture does.
+void add_picture_option(CLI::App& command, const std::string& option, std::string& path, const std::string& what,
+                        std::initializer_list<std::string_view> kinds);
 // --picture, told by `what`, and --size.
 void add_picture(CLI::App& command, std::string& path, int& size, const std::string& what);
 // index,x,y

@@ -9,6 +9,7 @@
 #include "geometry/csv.h"
 #include "io/atomic_file.h"
 #include "io/file_error.h"
+#include "io/picture_ending.h"
 #include "io/standard_streams.h"
 
 namespace lumicut {
@@ -55,8 +56,15 @@ std::vector<uint32_t> read_indices(const std::string& path, size_t count, const 
   return indices;
 }
 
+void add_picture_option(CLI::App& command, const std::string& option, std::string& path, const std::string& what,
+                        std::initializer_list<std::string_view> kinds) {
+  command.add_option(option, path, what)->check([kinds = std::vector(kinds)](const std::string& given) {
+    return io::wrong_picture_ending(given, kinds);
+  });
+}
+
 void add_picture(CLI::App& command, std::string& path, int& size, const std::string& what) {
-  command.add_option("--picture", path, what);
+  add_picture_option(command, "--picture", path, what, {".svg", ".png"});
   command.add_option("--size", size, "Its size in pixels")->check(CLI::Range(50, 10000));
 }
 
@@ -80,7 +88,11 @@ int run(int argc, char** argv) {
     Command command = add(app);
     commands.emplace_back(app.get_subcommands({}).back(), std::move(command));
   }
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;  // --help is an error of code 0
+  }
   try {
     for (const auto& [parsed, command] : commands)
       if (*parsed) return command();

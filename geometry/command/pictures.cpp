@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/rng.h"
+#include "io/text_lines.h"
 
 namespace lumicut {
 
@@ -141,6 +142,8 @@ Picture draw_atlas(std::span<const std::array<Point2, 3>> corners, std::span<con
   }
   return picture;
 }
+
+bool as_svg(const std::string& path) { return io::lower(path).ends_with(".svg"); }
 
 std::string draw_circles(bool svg, std::span<const Point2> points, std::span<const Circle> circles,
                          std::span<const uint32_t> chosen, int size, std::span<const Point2> chain,

@@ -35,6 +35,9 @@ Picture draw_mesh(const FaceMesh& mesh, std::span<const Colour> face_colours, in
 // An atlas: the charts' triangles with a colour a face, on white. [geometry/texture_atlas.h]
 Picture draw_atlas(std::span<const std::array<Point2, 3>> corners, std::span<const Colour> face_colours, int size);
 
+// Whether a file of this name holds SVG, which it does where it ends so; else PNG.
+bool as_svg(const std::string& path);
+
 struct Circle {
   Disk disk;
   Colour colour;

@@ -615,7 +615,8 @@ TEST(SceneJson, ProgramsAndAttributesAreRead) {
   EXPECT_EQ(p.instructions[1].op, uint32_t{LUMICUT_OP_VECTOR});
   EXPECT_EQ(p.instructions[1].inputs[1], -1);
   EXPECT_EQ(p.instructions[2].count, 6u);
-  EXPECT_EQ(p.constants, (std::vector<float>{5, 5, 5, 0.5f, 0.5f, 0.5f}));
+  EXPECT_EQ(p.instructions[1].inputs[2], -2) << "left out: 0";
+  EXPECT_EQ(p.constants, (std::vector<float>{5, 5, 5, 0, 0, 0, 0.5f, 0.5f, 0.5f}));
   EXPECT_EQ(scene.materials[0].values.diffuse_texture, 1);
   ASSERT_EQ(scene.meshes[0].attributes.size(), 1u);
   EXPECT_EQ(scene.meshes[0].attributes[0].id, p.instructions[3].data);
@@ -626,6 +627,9 @@ TEST(SceneJson, ProgramsAndAttributesAreRead) {
   };
   EXPECT_NE(wrong("/programs/0/steps/1/inputs/0", 1).find("programs[0].steps[1].inputs[0]: is 1"), std::string::npos);
   EXPECT_NE(wrong("/programs/0/steps/1/inputs/1", {1, 2}).find("programs[0].steps[1].inputs[1]"), std::string::npos);
+  EXPECT_NE(wrong("/programs/0/steps/2/inputs", {1, 1}).find(", but must be an array of at most 1, the inputs of ramp"),
+            std::string::npos);
+  EXPECT_NE(wrong("/programs/0/steps/1/mode", 27).find("programs[0].steps[1].mode: is 27"), std::string::npos);
   EXPECT_NE(wrong("/programs/0/steps/0/op", "place").find("programs[0].steps[0].op"), std::string::npos);
   EXPECT_NE(wrong("/materials/0/diffuse_texture/program", "q").find("no program \"q\""), std::string::npos);
   EXPECT_NE(wrong("/meshes/0/attributes/0/components", 2).find("holds 4 numbers for 4 vertices of 2 components"),

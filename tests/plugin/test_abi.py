@@ -156,12 +156,12 @@ class OneList(unittest.TestCase):
         text = text_of("plugin/include/lumicut/lumicut_programs.h")
         names = [name.lower() for name, _ in re.findall(r"LUMICUT_OP_(\w+) = (\d+)", text)]
         self.assertEqual([int(n) for _, n in re.findall(r"LUMICUT_OP_(\w+) = (\d+)", text)], list(range(len(names))))
-        inside = re.findall(r"^  X\((\w+), (\d+), \d+, \w+\)", text_of("scene/texture_program.h"), re.M)
-        self.assertEqual([name for name, _ in inside], names)
+        inside = re.findall(r"^  X\((\w+), (\d+), (\d+), \w+\)", text_of("scene/texture_program.h"), re.M)
+        self.assertEqual([name for name, _, _ in inside], names)
         self.assertEqual(list(self.module.PROGRAM_OPS), names)
-        self.assertEqual(list(self.module.PROGRAM_INPUTS), [int(n) for _, n in inside])
+        self.assertEqual(list(self.module.PROGRAM_INPUTS), [int(n) for _, n, _ in inside])
         files = re.search(r"kOps = \{(.*?)\};", text_of("io/program_json.cpp"), re.S)[1]
-        self.assertEqual(re.findall(r'"(\w+)"', files), names)
+        self.assertEqual(re.findall(r'"(\w+)", (\d+), (\d+)', files), inside)
         for name, size in (("Program", 40), ("Attribute", 24)):
             self.assertEqual(ctypes.sizeof(getattr(self.module, name)), size)
 

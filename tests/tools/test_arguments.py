@@ -34,13 +34,21 @@ class Arguments(Cli):
             self.refused(USAGE, "bench", "--scene", SCENE, "--run", "exhaustive", f"--size={size}", "-o", self.folder / "b", says="--size")
 
     def test_two_outputs_of_one_place_are_refused(self):
-        place = self.folder / "a.exr"
-        (self.folder / "link.exr").symlink_to(place)
-        for other in (place, f"{self.folder}/./a.exr", self.folder / "link.exr"):
+        place = self.folder / "a"
+        (self.folder / "link").symlink_to(place)
+        for other in (place, f"{self.folder}/./a", self.folder / "link"):
             self.refused(BAD_FILE, *SMALL, "-o", place, "--png", other, says="two outputs")
             self.refused(BAD_FILE, *SMALL, "-o", other, "--checkpoint", place, says="two outputs")
         self.assertFalse(place.exists())
         self.assert_ends(lumicut(*SMALL, "-o", "/dev/null", "--png", "/dev/null"), OK)
+
+    def test_a_picture_has_no_name_of_another_kind(self):
+        exr, png, jpg = (self.folder / f"a.{kind}" for kind in ("exr", "png", "JPG"))
+        self.refused(USAGE, *SMALL, "-o", png, says="--output: " + str(png) + " ends in .png, and would hold .exr")
+        self.refused(USAGE, *SMALL, "--png", jpg, says="would hold .png")
+        self.refused(USAGE, "compare", exr, exr, "--error-map", jpg, says="would hold .png or .exr")
+        self.refused(USAGE, *SMALL, "--preset", "", "-o", exr, says="--preset: no preset has an empty name")
+        self.assertEqual(list(self.folder.iterdir()), [])
 
     def test_emission_of_no_area_gives_a_black_image(self):
         scene = self.folder / "dark.json"
@@ -135,10 +143,11 @@ class Arguments(Cli):
         scene, image, lights = self.scene("scene.json"), self.folder / "a.exr", self.folder / "a.vpl"
         self.assert_ends(lumicut("render", scene, "--size", "8x8", "--vpls", "20", "-q", "-o", image, "--vpl-out", lights), OK)
         (self.folder / "link.json").symlink_to(scene)
+        (self.folder / "link.png").symlink_to(image)
         kept = {path: path.read_bytes() for path in (scene, image, lights)}
         for words in (["render", scene, "-o", scene], ["render", self.folder / "link.json", "--stats", scene],
                       ["render", scene, "--passes", "2", "--checkpoint", scene, "-o", self.folder / "b.exr"], ["render", scene, "--vpl-in", lights, "-o", lights],
-                      ["compare", image, image, "--error-image", image], ["mix", image, "-o", image]):
+                      ["compare", image, image, "--error-image", self.folder / "link.png"], ["mix", image, "-o", image]):
             with self.subTest(words):
                 self.assert_ends(lumicut(*words), BAD_FILE, "is read")
         self.assertEqual({path: path.read_bytes() for path in kept}, kept)

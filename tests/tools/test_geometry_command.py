@@ -47,9 +47,9 @@ class GeometryCommand(unittest.TestCase):
         path.write_text("".join(line + "\n" for line in lines))
         return path
 
-    def refused(self, *arguments, says=(), text=""):
+    def refused(self, *arguments, says=(), text="", code=1):
         done = run(*arguments, text=text)
-        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertEqual(done.returncode, code, done.stderr)
         for part in says:
             self.assertIn(part, done.stderr)
 
@@ -150,6 +150,7 @@ class GeometryCommand(unittest.TestCase):
         three = self.write("three.csv", ["0,0,0"])
         self.refused("balltree", three, "--picture", self.folder / "t.svg", says=["three.csv", "3 dimensions"])
         self.refused("balltree", three, "--queries", self.write("two.csv", ["0,0"]), says=["two.csv", "2 dimensions"])
+        self.refused("balltree", three, "--picture", self.folder / "t.jpg", says=["ends in .jpg", ".svg or .png"], code=2)
         self.refused("balltree", three, "--builder", "all", "--picture", self.folder / "t.svg", says=["--builder all"])
 
     # Nets and hitting sets
