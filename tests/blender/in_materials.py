@@ -167,6 +167,22 @@ class Materials(unittest.TestCase):
             with self.subTest(material=name):
                 self.assertLess(abs(ratio - 1).max(), tolerance + NOISE, f"{name}: {ours} instead of {cycles}")
 
+    def test_bent_normals_dim_matt_surfaces_where_light_comes_flat(self):
+        m = h.diffuse((0.8, 0.8, 0.8))
+        ob = h.add_plane(2.0, material=normal_mapped(m, next(n for n in m.node_tree.nodes if n.type == "BSDF_DIFFUSE"), picture("bent", tilted), 1.0))
+        ob.data.uv_layers.new(name="UVMap").data.foreach_set("uv", [0, 0, 1, 0, 1, 1, 0, 1])
+        h.add_light("SUN", energy=3, rotation=(1.0, 0, 0), angle=0)
+        bpy.context.scene.camera.data.type, bpy.context.scene.camera.data.ortho_scale = "ORTHO", 2.0
+        ours, theirs = h.both(16, 16, 0)
+        a, b = (h.blocks(image["Combined"][..., :3], 8) for image in (ours, theirs))
+        np.testing.assert_allclose(a, b, rtol=0.02, atol=0.01)  # up to 15 % undimmed
+        self.assertEqual(h.last_notes(), [])
+        if bpy.app.version >= (4, 3, 0):
+            m.cycles.use_bump_map_correction = False
+            ours, theirs = h.both(16, 16, 0)
+            np.testing.assert_allclose(ours["Combined"].mean((0, 1)), theirs["Combined"].mean((0, 1)), rtol=0.08)
+            self.assertTrue(any("Bump Map Correction" in note for note in h.last_notes()))
+
     def test_rough_clear_coats_are_as_bright_in_all_methods_as_path_traced(self):
         """A coat is a second point of its pixel to the methods that sum lights, and a choice to paths."""
         h.new_scene(48, 48)

@@ -158,7 +158,7 @@ enum {
   LUMICUT_BURLEY = 16,
   LUMICUT_SHADOWS_PASS = 32,
   LUMICUT_BUMP_SHADOWS = 128, /* bent normals, of normal and height textures: the diffuse part is dimmed where light comes flatter
-                                 than it seems, as Blender has it before 4.3 */
+                                 than it seems, as Cycles has it */
   LUMICUT_HOLDOUT = 64 /* camera rays that meet it show black, and count in no channel: alpha is 0 there. Other rays see it */
 };
 
