@@ -1,4 +1,4 @@
-"""The table docs/blender_nodes.md: what becomes of each of Blender's shader nodes and features, made from renders.
+"""The tables docs/blender_nodes.md and docs/blender_nodes_4.3.md: what becomes of each of Blender's shader nodes and features, made from renders.
 
 Nodes: each output is shown as emission on a square of its own, by Cycles and by us, at the centres of pixels. Shaders: each
 on a ball. Features: the same small scene with and without; a picture that does not change, and no note that says so, would
@@ -14,8 +14,7 @@ import numpy as np
 import helpers as h
 from lumicut_blender import report, runtime
 
-PAGE = h.ROOT / "docs/blender_nodes.md"
-VERSION = (3, 4, 1)  # that the page is made by
+PAGES = {(3, 4): "blender_nodes.md", (4, 3): "blender_nodes_4.3.md"}  # one for each Blender that this is tested with
 SIDE = 10  # pixels of a square
 APART, MOST = 2e-3, 0.15  # of max(1, value); share of places, next to borders of patterns
 NOT_IN_CYCLES = {"EEVEE_SPECULAR": "EEVEE alone", "SHADERTORGB": "EEVEE alone", "OUTPUT_LINESTYLE": "Freestyle alone", "UVALONGSTROKE": "Freestyle alone"}
@@ -276,16 +275,18 @@ class Page(unittest.TestCase):
 
         others = sorted((cls.bl_rna.name, NOT_IN_CYCLES[kind]) for cls in shader_nodes()
                         for kind in [getattr(self.probe(cls), "type", None)] if kind in NOT_IN_CYCLES)
-        text = HEAD + "\n\n".join([
+        page = PAGES.get(bpy.app.version[:2])
+        if page is None:
+            self.skipTest(f"no page is kept of Blender {bpy.app.version_string}")
+        rest = ", ".join(f"[Blender {'.'.join(map(str, version))}]({name})" for version, name in PAGES.items() if name != page)
+        text = HEAD.format(version=bpy.app.version_string, others=rest) + "\n\n".join([
             "## Nodes that give values", table("node: outputs", Page.rows["values"]),
             "## Shaders", table("shader", Page.rows["shaders"] + [(name, f"not there ({what})", "not there") for name, what in others]),
             "## Features", table("feature", Page.rows["features"])]) + "\n"
         if os.environ.get("LUMICUT_UPDATE_DOCS"):
-            PAGE.write_text(text)
-        if bpy.app.version[:2] != VERSION[:2]:
-            self.skipTest("the page is made by Blender 3.4.1")
+            (h.ROOT / "docs" / page).write_text(text)
         self.maxDiff = None
-        self.assertEqual(PAGE.read_text(), text, "run this with LUMICUT_UPDATE_DOCS=1")
+        self.assertEqual((h.ROOT / "docs" / page).read_text(), text, "run this with LUMICUT_UPDATE_DOCS=1")
 
     @staticmethod
     def probe(cls):
@@ -297,7 +298,7 @@ class Page(unittest.TestCase):
 
 HEAD = """# Blender's nodes and features
 
-Written by `tests/blender/in_status.py` from renders with Blender 3.4.1, and compared with today's at each run of the tests; do not edit.
+Written by `tests/blender/in_status.py` from renders with Blender {version} and its Cycles, and compared with today's at each run of the tests; do not edit. Others: {others}.
 What *Lumicut* says:
 
 - **exact**: the output shown as emission agrees with Cycles' to 0.002 at the centres of pixels (but for borders of patterns). Random parameters of each node: `tests/blender/in_programs.py`.

@@ -159,15 +159,17 @@ class Docs(unittest.TestCase):
         page = (ROOT / "docs/scene_format.md").read_text()
         self.assertEqual(sorted(k for k in keys if not re.search(rf'[`"]{k}[`"]', page)), [])
 
-    def test_notes_in_the_table_of_blenders_nodes_are_the_add_ons(self):
-        # The table itself is compared where Blender is: tests/blender/in_status.py.
+    def test_notes_in_the_tables_of_blenders_nodes_are_the_add_ons(self):
+        # The tables themselves are compared where Blender is: tests/blender/in_status.py.
         source = "".join(p.read_text() for p in sorted((ROOT / "export_scripts/lumicut_blender").glob("*.py")))
-        page = (ROOT / "docs/blender_nodes.md").read_text()
-        notes = {text for cell in re.findall(r"(?:by name|nuance): ([^|]*[^| ]) *\|", page) for text in cell.split("; ")}
-        self.assertGreater(len(notes), 18)
-        self.assertEqual(sorted(text for text in notes if text not in source), [])
-        features = set(re.findall(r"^\| ([^|:]*): [^|]* \| [^|]* \| (?:followed|exact)", page, re.MULTILINE))
-        self.assertGreater(len(features), 40)
+        for path in sorted((ROOT / "docs").glob("blender_nodes*.md")):
+            with self.subTest(page=path.name):
+                page = path.read_text()
+                notes = {text for cell in re.findall(r"(?:by name|nuance): ([^|]*[^| ]) *\|", page) for text in cell.split("; ")}
+                self.assertGreater(len(notes), 18)
+                self.assertEqual(sorted(text for text in notes if text not in source), [])
+                features = set(re.findall(r"^\| ([^|:]*): [^|]* \| [^|]* \| (?:followed|exact)", page, re.MULTILINE))
+                self.assertGreater(len(features), 40)
 
 
 if __name__ == "__main__":
