@@ -60,13 +60,14 @@ BuildOptions build_options_of(const std::string& text) {
 Tree build_tree(std::span<const Aabb> boxes, const BuildOptions& options, Progress* progress) {
   Tree tree;
   if (boxes.empty()) return tree;
-  tree.nodes.resize(2 * boxes.size() - 1);
+  tree.nodes = HugeArray<TreeNode>(2 * boxes.size() - 1);
   tree.prims.resize(boxes.size());
   if (boxes.size() == 1) {
     set_box(tree.nodes[0], boxes[0]);
-    tree.nodes[0].count = 1;
+    tree.nodes[0].first = 0, tree.nodes[0].count = 1;
     return tree;
   }
+  int depth = 0;  // 0: not known
   switch (options.builder) {
     case Builder::agglomerative:
     case Builder::agglomerative_parallel: {
@@ -74,7 +75,7 @@ Tree build_tree(std::span<const Aabb> boxes, const BuildOptions& options, Progre
       std::iota(prims.begin(), prims.end(), 0u);
       const Strategy strategy =
           options.builder == Builder::agglomerative_parallel ? Strategy::parallel : Strategy::locally_ordered;
-      place_merges(agglomerate_boxes(boxes, strategy, progress), prims, boxes, tree, {0, 1, 0});
+      depth = place_merges(agglomerate_boxes(boxes, strategy, progress), prims, boxes, tree, {0, 1, 0});
       break;
     }
     case Builder::binned_agglomerative:
@@ -90,12 +91,11 @@ Tree build_tree(std::span<const Aabb> boxes, const BuildOptions& options, Progre
       build_sweep(boxes, tree, progress);
       break;
   }
-  bool moved = false;
   if (options.reinsert_passes > 0 && options.reinsert_share > 0.0f && boxes.size() > 4) {
     optimize_by_reinsertion(tree, options.reinsert_share, options.reinsert_passes, progress);
-    moved = true;
+    return in_depth_first_order(tree, boxes);
   }
-  if (moved || depth_of(tree) >= kMaxTreeDepth) tree = in_depth_first_order(tree, boxes);
+  if ((depth > 0 ? depth : depth_of(tree)) >= kMaxTreeDepth) tree = in_depth_first_order(tree, boxes);
   return tree;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/aabb.h"
+#include "core/huge_array.h"
 #include "core/progress.h"
 
 namespace lumicut {
@@ -22,7 +23,7 @@ struct TreeNode {
 };
 
 struct Tree {
-  std::vector<TreeNode> nodes;  // 2N-1 for N primitives, one per leaf; empty for none
+  HugeArray<TreeNode> nodes;    // 2N-1 for N primitives, one per leaf; empty for none
   std::vector<uint32_t> prims;  // in the order of the leaves, left to right
 };
 

@@ -130,7 +130,7 @@ lumicut_result lumicut_accel_get_info(lumicut_accel accel, lumicut_accel_info* i
 
 lumicut_result lumicut_accel_get_node(lumicut_accel accel, uint32_t index, lumicut_accel_node_info* node) {
   return guard([&] {
-    const std::vector<TreeNode>& nodes = tree_of(accel, "lumicut_accel_get_node").nodes;
+    const HugeArray<TreeNode>& nodes = tree_of(accel, "lumicut_accel_get_node").nodes;
     if (index >= nodes.size())
       fail_argument("lumicut_accel_get_node: index " + number_text(uint64_t{index}) + " is out of range: there are " +
                     number_text(uint64_t{nodes.size()}) + " nodes");

@@ -9,8 +9,6 @@
 #define LUMICUT_ACCEL_AGGLOMERATE_BEST_MATCH_TREE_INL_H_
 #endif
 
-#include <hwy/aligned_allocator.h>
-
 #include <algorithm>
 #include <vector>
 
@@ -79,7 +77,7 @@ class BestMatchTree {
     std::copy_n(other.count_, kMaxLevels, count_);
     reserve();
     clusters_.for_chunks(used_, 1 << 16, [&](size_t begin, size_t end) {
-      std::copy(other.data_.get() + begin, other.data_.get() + end, data_.get() + begin);
+      std::copy(other.data_.data() + begin, other.data_.data() + end, data_.data() + begin);
     });
   }
 
@@ -112,16 +110,15 @@ class BestMatchTree {
     uint32_t least, level, block;
   };
 
-  float* block(size_t level, size_t i) { return data_.get() + (start_[level] + i) * stride_; }
-  const float* block(size_t level, size_t i) const { return data_.get() + (start_[level] + i) * stride_; }
+  float* block(size_t level, size_t i) { return data_.data() + (start_[level] + i) * stride_; }
+  const float* block(size_t level, size_t i) const { return data_.data() + (start_[level] + i) * stride_; }
   uint32_t* ids(float* b) const { return reinterpret_cast<uint32_t*>(b + stride_ - 8); }
   const uint32_t* ids(const float* b) const { return reinterpret_cast<const uint32_t*>(b + stride_ - 8); }
 
   void reserve() {
     if (used_ <= capacity_) return;
     capacity_ = used_;
-    data_ = hwy::AllocateAligned<float>(capacity_);
-    if (!data_) throw Error(ErrorCode::out_of_memory, "agglomerate: no memory for the search tree");
+    data_ = HugeArray<float>(capacity_);
   }
 
   // Stores the minima over `child` (null: none) in `lane` of `parent`. True when that changed something.
@@ -212,15 +209,8 @@ class BestMatchTree {
   const Clusters<Policy>& clusters_;
   size_t stride_, size_ = 0, levels_ = 0, used_ = 0, capacity_ = 0;
   size_t start_[kMaxLevels] = {}, count_[kMaxLevels] = {};
-  hwy::AlignedFreeUniquePtr<float[]> data_;
+  HugeArray<float> data_;
 };
-
-// The clusters that are left in the slots.
-inline void keep_active(const std::vector<uint32_t>& in_slot, std::vector<uint32_t>& active) {
-  active.clear();
-  for (const uint32_t cluster : in_slot)
-    if (cluster != kNone) active.push_back(cluster);
-}
 
 }  // namespace lumicut::HWY_NAMESPACE::agglomeration
 HWY_AFTER_NAMESPACE();

@@ -7,20 +7,20 @@
 #define LUMICUT_ACCEL_AGGLOMERATE_CLUSTERS_INL_H_
 #endif
 
-#include <hwy/aligned_allocator.h>
 #include <hwy/highway.h>
 
 #include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <numeric>
-#include <string>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "accel/agglomerate.h"
 #include "accel/agglomerate/policy-inl.h"
 #include "core/error.h"
+#include "core/huge_array.h"
 #include "core/parallel.h"
 #include "core/progress.h"
 
@@ -40,13 +40,11 @@ class Clusters {
  public:
   Clusters(const Policy& policy, size_t n, bool threads, Progress* progress)
       : policy_(policy), n_(n), threads_(threads), progress_(progress) {
-    features_ = hwy::AllocateAligned<float>(std::max<size_t>(1, n * feature_count()));
-    if (!features_)
-      throw Error(ErrorCode::out_of_memory, "agglomerate: no memory for " + std::to_string(n) + " leaves");
+    features_ = HugeArray<float>(n * feature_count());
+    merges_ = HugeArray<Merge>(n > 0 ? n - 1 : 0);
     least_.resize(n);
     std::iota(least_.begin(), least_.end(), 0u);
     node_ = least_;
-    merges_.reserve(n > 0 ? n - 1 : 0);
   }
 
   size_t leaf_count() const { return n_; }
@@ -86,26 +84,75 @@ class Clusters {
   }
 
   // The features of a cluster, its least leaf, and its id in the tree.
-  float* leaf(size_t i) { return features_.get() + i * feature_count(); }
-  const float* of(uint32_t cluster) const { return features_.get() + static_cast<size_t>(cluster) * feature_count(); }
+  float* leaf(size_t i) { return features_.data() + i * feature_count(); }
+  const float* of(uint32_t cluster) const { return features_.data() + static_cast<size_t>(cluster) * feature_count(); }
   uint32_t least(uint32_t cluster) const { return least_[cluster]; }
   uint32_t node(uint32_t cluster) const { return node_[cluster]; }
-  void set_node(uint32_t cluster, uint32_t id) { node_[cluster] = id; }
 
   // Cluster `a` becomes the union of `a` and `b`, with that id in the tree. `b` must not be used any more.
   Merge join(uint32_t a, uint32_t b, float cost, uint32_t id) {
     float joint[kMaxFeatures];
     policy_.merge(of(a), of(b), joint);
-    std::copy_n(joint, feature_count(), features_.get() + static_cast<size_t>(a) * feature_count());
-    const Merge merge{node_[a], node_[b], cost};
+    std::copy_n(joint, feature_count(), features_.data() + static_cast<size_t>(a) * feature_count());
+    const bool in_order = least_[a] < least_[b];
+    const Merge merge{node_[in_order ? a : b], node_[in_order ? b : a], cost};
     least_[a] = std::min(least_[a], least_[b]);
     node_[a] = id;
     return merge;
   }
   void join(uint32_t a, uint32_t b, float cost) {
-    merges_.push_back(join(a, b, cost, static_cast<uint32_t>(n_ + merges_.size())));
+    merges_[merge_count_] = join(a, b, cost, next_id());
+    ++merge_count_;
   }
-  std::vector<Merge>& merges() { return merges_; }
+  // `to`: what is in `from` but for kNone, in its order.
+  void keep(const std::vector<uint32_t>& from, std::vector<uint32_t>& to) const {
+    constexpr size_t kChunk = 1 << 15;
+    std::vector<size_t> start(from.size() / kChunk + 2, 0);
+    for_chunks(from.size(), kChunk, [&](size_t begin, size_t end) {
+      size_t& count = start[begin / kChunk + 1];
+      for (size_t i = begin; i < end; ++i) count += from[i] != kNone;
+    });
+    std::partial_sum(start.begin(), start.end(), start.begin());
+    to.resize(start.back());
+    for_chunks(from.size(), kChunk, [&](size_t begin, size_t end) {
+      size_t at = start[begin / kChunk];
+      for (size_t i = begin; i < end; ++i)
+        if (from[i] != kNone) to[at++] = from[i];
+    });
+  }
+
+  size_t merge_count() const { return merge_count_; }
+  uint32_t next_id() const { return static_cast<uint32_t>(n_ + merge_count_); }
+  // Where merges to come are stored, and how many have been.
+  Merge* next_merge() { return merges_.data() + merge_count_; }
+  void count_merges(size_t made) { merge_count_ += made; }
+
+  // What a part of the clusters made beside other parts: merges, numbered from `first_id` on, which is not below
+  // next_id(); and the clusters they may be of, or kNone.
+  struct PartMerges {
+    const Merge* merges;
+    size_t count;
+    uint32_t first_id;
+    std::span<const uint32_t> clusters;
+  };
+  // Appends them without the gaps in their numbers: no part knew how many another makes.
+  void append(const std::vector<PartMerges>& parts) {
+    const uint32_t from = next_id();
+    std::vector<size_t> start(parts.size() + 1, merge_count_);
+    for (size_t p = 0; p < parts.size(); ++p) start[p + 1] = start[p] + parts[p].count;
+    for_chunks(parts.size(), 1, [&](size_t p, size_t) {
+      const PartMerges& part = parts[p];
+      const uint32_t shift = part.first_id - static_cast<uint32_t>(n_ + start[p]);
+      const auto renumbered = [&](uint32_t node) { return node >= from ? node - shift : node; };
+      for (size_t i = 0; i < part.count; ++i) {
+        const Merge& m = part.merges[i];
+        merges_[start[p] + i] = {renumbered(m.left), renumbered(m.right), m.cost};
+      }
+      for (const uint32_t cluster : part.clusters)
+        if (cluster != kNone) node_[cluster] = renumbered(node_[cluster]);
+    });
+    merge_count_ = start.back();
+  }
 
   // d(a, b) of one pair.
   float pair_cost(uint32_t a, uint32_t b) const {
@@ -118,47 +165,57 @@ class Clusters {
     return out[0];
   }
 
-  // The merges in canonical order, see Merge.
+  // The merges in canonical order, see Merge. A subtree's part of the list follows from the sizes of subtrees alone.
   std::vector<Merge> canonical() const {
-    std::vector<Merge> out(merges_.size());
-    if (out.empty()) return out;
     const auto n = static_cast<uint32_t>(n_);
-    std::vector<uint32_t> id(merges_.size()), least(merges_.size());
-    const auto least_of = [&](uint32_t node) { return node < n ? node : least[node - n]; };
-    for (size_t i = 0; i < merges_.size(); ++i)
-      least[i] = std::min(least_of(merges_[i].left), least_of(merges_[i].right));
-    struct Visit {
-      uint32_t merge;
-      bool done;
+    std::vector<Merge> out(merge_count_);
+    std::vector<uint32_t> sizes(merge_count_);  // merges in each subtree
+    const auto size_of = [&](uint32_t node) { return node < n ? 0u : sizes[node - n]; };
+    for (size_t i = 0; i < merge_count_; ++i) sizes[i] = size_of(merges_[i].left) + size_of(merges_[i].right) + 1;
+
+    struct Part {
+      uint32_t node, begin;  // of its part of the list
     };
-    std::vector<Visit> stack{{static_cast<uint32_t>(merges_.size() - 1), false}};
-    uint32_t count = 0;
-    while (!stack.empty()) {
-      const Visit v = stack.back();
-      const Merge& m = merges_[v.merge];
-      const bool swap = least_of(m.right) < least_of(m.left);
-      const uint32_t left = swap ? m.right : m.left, right = swap ? m.left : m.right;
-      if (!v.done) {
-        stack.back().done = true;
-        if (right >= n) stack.push_back({right - n, false});
-        if (left >= n) stack.push_back({left - n, false});
-        continue;
-      }
-      stack.pop_back();
-      id[v.merge] = n + count;
-      out[count++] = {left < n ? left : id[left - n], right < n ? right : id[right - n], m.cost};
+    const auto place = [&](const Part& part, std::vector<Part>& children) {
+      const Merge& m = merges_[part.node - n];
+      const uint32_t begin_right = part.begin + size_of(m.left), last = begin_right + size_of(m.right);
+      out[last] = {m.left < n ? m.left : n + begin_right - 1, m.right < n ? m.right : n + last - 1, m.cost};
+      if (m.right >= n) children.push_back({m.right, begin_right});
+      if (m.left >= n) children.push_back({m.left, part.begin});
+    };
+    std::vector<Part> large, small;
+    if (merge_count_ > 0) large.push_back({next_id() - 1, 0});
+    while (!large.empty()) {
+      const Part part = large.back();
+      large.pop_back();
+      if (size_of(part.node) > kPartMerges)
+        place(part, large);
+      else
+        small.push_back(part);
     }
+    for_chunks(small.size(), 4, [&](size_t begin, size_t end) {
+      std::vector<Part> parts(small.begin() + static_cast<ptrdiff_t>(begin),
+                              small.begin() + static_cast<ptrdiff_t>(end));
+      while (!parts.empty()) {
+        const Part part = parts.back();
+        parts.pop_back();
+        place(part, parts);
+      }
+    });
     return out;
   }
 
  private:
+  static constexpr size_t kPartMerges = 4096;
+
   const Policy& policy_;
   size_t n_;
   bool threads_;
   Progress* progress_;
-  hwy::AlignedFreeUniquePtr<float[]> features_;
+  HugeArray<float> features_;
   std::vector<uint32_t> least_, node_;
-  std::vector<Merge> merges_;
+  HugeArray<Merge> merges_;  // of N - 1
+  size_t merge_count_ = 0;
 };
 
 }  // namespace lumicut::HWY_NAMESPACE::agglomeration

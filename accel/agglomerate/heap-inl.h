@@ -59,14 +59,14 @@ void merge_by_heap(Clusters<Policy>& clusters, std::vector<uint32_t> active) {
       push(pair.owner);
       continue;
     }
-    if ((clusters.merges().size() & 0xfff) == 0) clusters.check();
+    if ((clusters.merge_count() & 0xfff) == 0) clusters.check();
     clusters.join(pair.owner, pair.other, pair.cost);
     const uint32_t slot = slot_of[pair.other];
     slot_of[pair.other] = kNone, in_slot[slot] = kNone;
     tree.set(slot, kNone, tree.levels() - 1);
     tree.set(slot_of[pair.owner], pair.owner, tree.levels() - 1);
     if (--alive <= next_rebuild && alive > 64) {
-      keep_active(in_slot, active);
+      clusters.keep(in_slot, active);
       rebuild();
       next_rebuild = alive / 2;
     }

@@ -23,11 +23,11 @@ namespace lumicut::HWY_NAMESPACE::agglomeration {
 // is a stack: below a merge of its top it remains a chain of best matches. A chain stalls where a best match is outside
 // of the slots, found in `outside`, a copy of the tree from before: outside clusters only grow, so by Eq. 1 no merge
 // inside depends on what is merged there. `first_id`: id of the first merge; `in_slot`: the cluster in each slot, or
-// kNone.
+// kNone. Returns the number of merges.
 template <ClusterPolicy Policy>
-void merge_chains_within(Clusters<Policy>& clusters, BestMatchTree<Policy>& tree, const BestMatchTree<Policy>* outside,
-                         size_t top, size_t begin, size_t end, size_t stop_at, uint32_t first_id,
-                         std::vector<uint32_t>& in_slot, std::vector<Merge>& merges) {
+size_t merge_chains_within(Clusters<Policy>& clusters, BestMatchTree<Policy>& tree,
+                           const BestMatchTree<Policy>* outside, size_t top, size_t begin, size_t end, size_t stop_at,
+                           uint32_t first_id, std::vector<uint32_t>& in_slot, Merge* merges) {
   struct Link {
     uint32_t slot;
     Match match;  // the previous link, which a better match must beat
@@ -35,11 +35,11 @@ void merge_chains_within(Clusters<Policy>& clusters, BestMatchTree<Policy>& tree
   std::vector<Link> links;
   std::vector<uint8_t> stalled(outside != nullptr ? end - begin : 0, 0);
   const auto is_stalled = [&](size_t slot) { return outside != nullptr && stalled[slot - begin] != 0; };
-  size_t alive = end - begin, scan = begin;
+  size_t alive = end - begin, scan = begin, made = 0;
   while (alive > stop_at) {
     if (links.empty()) {
       while (scan < end && (in_slot[scan] == kNone || is_stalled(scan))) ++scan;
-      if (scan == end) return;
+      if (scan == end) break;
       links.push_back({static_cast<uint32_t>(scan), {}});
     }
     const Link last = links.back();
@@ -55,19 +55,20 @@ void merge_chains_within(Clusters<Policy>& clusters, BestMatchTree<Policy>& tree
       links.push_back({match.slot, {match.cost, clusters.least(cluster), last.slot}});
       continue;
     }
-    if (match.slot == kNone) return;  // no other cluster
-    if ((merges.size() & 0x3ff) == 0) clusters.check();
+    if (match.slot == kNone) break;  // no other cluster
+    if ((made & 0x3ff) == 0) clusters.check();
     const uint32_t into = match.slot;
     clusters.expect(in_slot[into] != kNone && into != last.slot);
     links.resize(links.size() - 2);
-    merges.push_back(
-        clusters.join(in_slot[into], cluster, match.cost, first_id + static_cast<uint32_t>(merges.size())));
+    merges[made] = clusters.join(in_slot[into], cluster, match.cost, first_id + static_cast<uint32_t>(made));
+    ++made;
     in_slot[last.slot] = kNone;
     tree.set(last.slot, kNone, top);
     tree.set(into, in_slot[into], top);
     scan = std::min<size_t>(scan, into);
     --alive;
   }
+  return made;
 }
 
 // Merges `active` to one cluster. The search tree is rebuilt whenever half of the clusters are gone.
@@ -80,9 +81,9 @@ void merge_locally_ordered(Clusters<Policy>& clusters, std::vector<uint32_t> act
     tree.build(active);
     in_slot = active;
     const size_t stop_at = active.size() > 64 ? active.size() / 2 : 1;
-    merge_chains_within<Policy>(clusters, tree, nullptr, tree.levels() - 1, 0, active.size(), stop_at,
-                                static_cast<uint32_t>(clusters.leaf_count()), in_slot, clusters.merges());
-    keep_active(in_slot, active);
+    clusters.count_merges(merge_chains_within<Policy>(clusters, tree, nullptr, tree.levels() - 1, 0, active.size(),
+                                                      stop_at, clusters.next_id(), in_slot, clusters.next_merge()));
+    clusters.keep(in_slot, active);
   }
 }
 

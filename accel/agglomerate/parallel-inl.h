@@ -24,37 +24,26 @@ template <ClusterPolicy Policy>
 void merge_in_regions(Clusters<Policy>& clusters, std::vector<uint32_t> active) {
   BestMatchTree<Policy> tree(clusters), before(clusters);
   std::vector<uint32_t> in_slot;
-  std::vector<std::vector<Merge>> merges;
+  HugeArray<Merge> made(active.size());  // in each region from its first slot on
+  std::vector<typename Clusters<Policy>::PartMerges> parts;
   for (;;) {
-    const size_t m = active.size(), top = m > (1u << 21) ? 4 : (m > (1u << 16) ? 3 : 2),
+    const size_t m = active.size(), top = m > (1u << 21) ? 4 : (m > (1u << 14) ? 3 : 2),
                  span = size_t{1} << (3 * (top + 1));
     if (m < 4 * span) return merge_locally_ordered(clusters, std::move(active));
     sort_in_space(clusters, active);
     tree.build(active);
     before.copy(tree);
     in_slot = active;
-    const size_t count = (m + span - 1) / span;
-    const auto first_id = static_cast<uint32_t>(clusters.leaf_count() + clusters.merges().size());
-    merges.assign(count, {});
-    clusters.for_chunks(count, 1, [&](size_t region, size_t) {
+    parts.assign((m + span - 1) / span, {});
+    clusters.for_chunks(parts.size(), 1, [&](size_t region, size_t) {
       const size_t begin = region * span, end = std::min(m, begin + span);
-      merge_chains_within(clusters, tree, &before, top, begin, end, 1, first_id + static_cast<uint32_t>(begin), in_slot,
-                          merges[region]);
+      Merge* merges = made.data() + begin;
+      const uint32_t first_id = clusters.next_id() + static_cast<uint32_t>(begin);
+      const size_t count = merge_chains_within(clusters, tree, &before, top, begin, end, 1, first_id, in_slot, merges);
+      parts[region] = {merges, count, first_id, {in_slot.data() + begin, end - begin}};
     });
-    // Regions numbered their merges with gaps: none knew the number of another's.
-    for (size_t region = 0; region < count; ++region) {
-      const auto gapped = first_id + static_cast<uint32_t>(region * span),
-                 shift = gapped - static_cast<uint32_t>(clusters.leaf_count() + clusters.merges().size());
-      for (Merge merge : merges[region]) {
-        if (merge.left >= first_id) merge.left -= shift;
-        if (merge.right >= first_id) merge.right -= shift;
-        clusters.merges().push_back(merge);
-      }
-      for (size_t slot = region * span; slot < std::min(m, (region + 1) * span); ++slot)
-        if (const uint32_t c = in_slot[slot]; c != kNone && clusters.node(c) >= first_id)
-          clusters.set_node(c, clusters.node(c) - shift);
-    }
-    keep_active(in_slot, active);
+    clusters.append(parts);
+    clusters.keep(in_slot, active);
     // Regions that merge little gain nothing over one chain.
     if (active.size() > m - m / 8) return merge_locally_ordered(clusters, std::move(active));
   }

@@ -64,9 +64,10 @@ void build_binned(std::span<const Aabb> boxes, bool all_axes, size_t agglomerate
 // sweep_builder.cpp
 void build_sweep(std::span<const Aabb> boxes, Tree& tree, Progress* progress);
 
-// merge_layout.cpp: stores the tree that a list of merges describes. prims[i]: the primitive of leaf i.
-void place_merges(const std::vector<Merge>& merges, std::span<const uint32_t> prims, std::span<const Aabb> boxes,
-                  Tree& tree, SubtreeSlots at);
+// merge_layout.cpp: stores the tree that a list of merges describes, and returns its depth. prims[i]: the primitive of
+// leaf i.
+int place_merges(const std::vector<Merge>& merges, std::span<const uint32_t> prims, std::span<const Aabb> boxes,
+                 Tree& tree, SubtreeSlots at);
 
 // reinsertion.cpp: passes over `share` (0 to 1) of the nodes. Leaves nodes in any order, and the tree may be deeper.
 void optimize_by_reinsertion(Tree& tree, float share, int passes, Progress* progress);

@@ -142,7 +142,7 @@ class Reinsertion {
     }
   }
 
-  std::vector<TreeNode>& nodes_;
+  HugeArray<TreeNode>& nodes_;
   Progress* progress_;
   std::vector<uint32_t> parents_;
 };

@@ -69,7 +69,7 @@ std::vector<uint32_t> primitive_counts(const Tree& tree) {
 
 Tree in_depth_first_order(const Tree& in, std::span<const Aabb> boxes) {
   Tree out;
-  out.nodes.resize(in.nodes.size());
+  out.nodes = HugeArray<TreeNode>(in.nodes.size());
   out.prims.resize(in.prims.size());
   const std::vector<uint32_t> count = primitive_counts(in);
   struct Item {

@@ -2,50 +2,14 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdlib>
 #include <functional>
-#include <memory>
 #include <span>
 #include <vector>
 
 #include "accel/bvh_build.h"
-#include "core/error.h"
-
-#ifdef __linux__
-#include <sys/mman.h>
-#endif
+#include "core/huge_array.h"
 
 namespace lumicut {
-
-// An array of fixed size in huge pages where possible: traversal accesses memory at random, and page walks cost as much
-// as cache misses.
-template <typename T>
-class HugeArray {
- public:
-  HugeArray() = default;
-  explicit HugeArray(size_t n) : size_(n) {
-    if (n == 0) return;
-    const size_t page = n * sizeof(T) >= (size_t{4} << 20) ? size_t{2} << 20 : 256;
-    const size_t bytes = (n * sizeof(T) + page - 1) / page * page;
-    data_.reset(static_cast<T*>(std::aligned_alloc(page, bytes)));
-    if (!data_) throw Error(ErrorCode::out_of_memory, "no memory for " + std::to_string(bytes) + " bytes of a BVH");
-#ifdef __linux__
-    if (page > 256) madvise(data_.get(), bytes, MADV_HUGEPAGE);
-#endif
-  }
-  T* data() { return data_.get(); }
-  const T* data() const { return data_.get(); }
-  size_t size() const { return size_; }
-  T& operator[](size_t i) { return data_.get()[i]; }
-  const T& operator[](size_t i) const { return data_.get()[i]; }
-
- private:
-  struct Free {
-    void operator()(T* p) const { std::free(p); }
-  };
-  std::unique_ptr<T, Free> data_;
-  size_t size_ = 0;
-};
 
 // A child word: kLeafBit and the index of a block (or of an instance), the index of a node, or kEmptyChild.
 inline constexpr uint32_t kLeafBit = 0x80000000u;

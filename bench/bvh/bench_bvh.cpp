@@ -312,26 +312,33 @@ void bench_build(const std::vector<BenchMesh>& meshes, const std::vector<std::st
 
 void bench_parallel(const std::vector<BenchMesh>& meshes, int rounds) {
   std::printf(
-      "\n## Two threads\n\nWall seconds, least of %d.\n\n| mesh | exact, 1 thread | agglomerative-parallel, 1 thread | "
-      "2 "
-      "threads | exact / parallel on 2 | binned-agglomerative, 1 thread | 2 threads | speedup "
-      "|\n|---|---|---|---|---|---|---|---|\n",
+      "\n## Two threads\n\nWall seconds, median of %d; builders and numbers of threads take turns.\n\n| mesh | exact, "
+      "1 "
+      "thread | agglomerative-parallel (same tree), 1 thread | 2 threads | exact / parallel on 2 | "
+      "binned-agglomerative, 1 thread | 2 threads | speedup |\n|---|---|---|---|---|---|---|---|\n",
       rounds);
   for (const BenchMesh& mesh : meshes) {
     const std::vector<Aabb> boxes = boxes_of(mesh);
-    const auto least = [&](const char* builder, int threads) {
-      tbb::task_arena arena(threads);
-      double best = 1e9;
-      for (int i = 0; i < rounds; ++i)
-        best =
-            std::min(best, timed_wall([&] { arena.execute([&] { build_tree(boxes, build_options_of(builder)); }); }));
-      return best;
+    struct Run {
+      const char* builder;
+      int threads;
+      std::vector<double> seconds;
     };
-    const double exact = least("agglomerative", 1), p1 = least("agglomerative-parallel", 1),
-                 p2 = least("agglomerative-parallel", 2), b1 = least("binned-agglomerative", 1),
-                 b2 = least("binned-agglomerative", 2);
-    std::printf("| %s | %.3f | %.3f | %.3f | %.2fx | %.3f | %.3f | %.2fx |\n", mesh.name.c_str(), exact, p1, p2,
-                exact / p2, b1, b2, b1 / b2);
+    Run runs[] = {{"agglomerative", 1, {}},
+                  {"agglomerative-parallel", 1, {}},
+                  {"agglomerative-parallel", 2, {}},
+                  {"binned-agglomerative", 1, {}},
+                  {"binned-agglomerative", 2, {}}};
+    for (int round = 0; round < rounds; ++round)
+      for (Run& run : runs) {
+        tbb::task_arena arena(run.threads);
+        run.seconds.push_back(
+            timed_wall([&] { arena.execute([&] { build_tree(boxes, build_options_of(run.builder)); }); }));
+      }
+    double s[5];
+    for (int i = 0; i < 5; ++i) s[i] = median(runs[i].seconds);
+    std::printf("| %s | %.3f | %.3f | %.3f | %.2fx | %.3f | %.3f | %.2fx |\n", mesh.name.c_str(), s[0], s[1], s[2],
+                s[0] / s[2], s[3], s[4], s[3] / s[4]);
     std::fflush(stdout);
   }
 }

@@ -5,7 +5,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <queue>
 #include <vector>
@@ -47,7 +46,7 @@ class Schedule {
   void end_section() {
     double all = 0, seconds = 0;
     for (const Work& w : chunks_) all += w.blocks, seconds += w.seconds;
-    (all > 0 ? out_.regions_seconds : out_.other_chunks_seconds) += seconds;
+    (all > 0 ? out_.regions_seconds : (sorting_ ? out_.sort_seconds : out_.other_chunks_seconds)) += seconds;
     out_.in_regions += all;
     for (size_t k = 0; k < std::size(kCores); ++k) {
       out_.blocks[k] += makespan(kCores[k], &Work::blocks);
@@ -55,21 +54,9 @@ class Schedule {
     }
     mark();
   }
-  // Median splits: each half may be split beside the other down to 8,192 items; a level takes as long as any other.
-  void begin_sort() { serial(); }
-  void end_sort(size_t n) {
-    const Work w = taken();
-    out_.sort_seconds += w.seconds;
-    const double levels = std::max(1.0, std::log2(static_cast<double>(n) / 8)),
-                 split = std::clamp(std::log2(static_cast<double>(n) / 8192), 0.0, levels);
-    for (size_t k = 0; k < std::size(kCores); ++k) {
-      double time = (levels - split) / std::min<double>(kCores[k], std::exp2(std::floor(split)));
-      for (double level = 0; level < split; ++level)
-        time += std::min(1.0, split - level) / std::min<double>(kCores[k], std::exp2(level));
-      out_.seconds[k] += w.seconds * time / levels;
-    }
-    mark();
-  }
+  // Sections in between are of sorting.
+  void begin_sort() { sorting_ = true; }
+  void end_sort() { sorting_ = false; }
   void start() { mark(); }
   Layout finish() {
     serial();
@@ -105,6 +92,7 @@ class Schedule {
     return last;
   }
   Work at_{};
+  bool sorting_ = false;
   std::vector<Work> chunks_;
   Layout out_;
 };

@@ -239,6 +239,21 @@ TEST(Agglomerate, ParallelBuildsTheSerialTreeOnAnyNumberOfThreads) {
   }
 }
 
+// Regions and shares number their merges by themselves; one box far out leaves all others in one bucket of a split.
+TEST(Agglomerate, ParallelBuildsTheSerialTreeOfManyCoincidentBoxes) {
+  auto boxes = boxes_of(test::random_soup(24000, 0.03f, 7));
+  for (size_t i = 0; i < 24000; ++i)
+    for (size_t copy = 0; copy < i % 4; ++copy) boxes.push_back(boxes[i]);
+  boxes.push_back({{1e6f, 1e6f, 1e6f}, {1e6f, 1e6f, 1e6f}});
+  const auto serial = agglomerate_boxes(boxes, Strategy::locally_ordered);
+  EXPECT_EQ(agglomerate_boxes(boxes, Strategy::heap), serial);
+  expect_canonical_tree(serial, boxes.size());
+  for (const int threads : {1, 3}) {
+    tbb::task_arena arena(threads);
+    arena.execute([&] { EXPECT_EQ(agglomerate_boxes(boxes, Strategy::parallel), serial) << threads; });
+  }
+}
+
 TEST(Agglomerate, CostOfAPairOfBoxesIsTheJointHalfArea) {
   // Sides 1, 2, 4 of the joint box, scaled by 1/4 (a power of two) inside: 14/16.
   const Aabb a{{0, 0, 0}, {1, 1, 1}}, b{{0, 1, 3}, {0.5f, 2, 4}};
