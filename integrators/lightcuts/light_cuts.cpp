@@ -104,7 +104,15 @@ HWY_INLINE void TraceEstimates(const Accel& accel, const Vpl& light, const Rgb& 
   }
 }
 
+// Notes what the points in `lanes` of a group get by a node of their cuts.
+HWY_INLINE void Record(CutRecord& record, const CutEntry& e, size_t group, size_t i, hn::Mask<D> lanes, V luminance) {
+  const D d;
+  float* to = record.luminance.data() + e.visit * kCutPoints + group * kLanes + i;
+  hn::StoreU(hn::IfThenElse(lanes, luminance, hn::LoadU(d, to)), d, to);
+}
+
 // Puts a node into the cuts of the points in `active`. `parent`: its parent's entry, or nullptr.
+template <bool kRecord>
 void AddNode(const LightTree& tree, const Accel& accel, const CutOptions& o, uint32_t node_index,
              const uint16_t* active, const CutEntry* parent, LightCuts& cuts) {
   const D d;
@@ -129,6 +137,7 @@ void AddNode(const LightTree& tree, const Accel& accel, const CutOptions& o, uin
     any |= reached;
   }
   if (any == 0) return cuts.release(index);
+  if constexpr (kRecord) e.visit = o.record->add(node_index, parent != nullptr ? parent->visit : CutRecord::kNone);
 
   if (parent != nullptr && parent->representative == e.representative) {
     // The same light at another intensity: its estimates and shadows are known.
@@ -162,8 +171,11 @@ void AddNode(const LightTree& tree, const Accel& accel, const CutOptions& o, uin
       if (lit) {
         const V est[3] = {hn::Load(d, e.estimate[0][g] + i), hn::Load(d, e.estimate[1][g] + i),
                           hn::Load(d, e.estimate[2][g] + i)};
-        total = hn::Add(total, LuminanceOf(d, est[0], est[1], est[2]));
+        const V luminance = LuminanceOf(d, est[0], est[1], est[2]);
+        total = hn::Add(total, luminance);
         hn::Store(total, d, cuts.luminance[g] + i);
+        if constexpr (kRecord)
+          if (leaf) Record(*o.record, e, g, i, mask, luminance);
         for (size_t k = 0; leaf && k < 3; ++k)
           hn::Store(hn::Add(hn::Load(d, cuts.radiance[k][g] + i), est[k]), d, cuts.radiance[k][g] + i);
       }
@@ -182,6 +194,7 @@ void AddNode(const LightTree& tree, const Accel& accel, const CutOptions& o, uin
 }
 
 // Leaves the cluster in the cuts of the points whose share it is within, and refines it in those of the others.
+template <bool kRecord>
 HWY_INLINE void Refine(const LightTree& tree, const Accel& accel, const CutOptions& o, uint32_t index,
                        LightCuts& cuts) {
   const D d;
@@ -210,15 +223,17 @@ HWY_INLINE void Refine(const LightTree& tree, const Accel& accel, const CutOptio
       for (size_t k = 0; k < 3; ++k)
         hn::Store(hn::Add(hn::Load(d, cuts.radiance[k][g] + i), hn::IfThenZeroElse(wanted, est[k])), d,
                   cuts.radiance[k][g] + i);
-      const V rest = hn::Max(zero, hn::Sub(total, LuminanceOf(d, est[0], est[1], est[2])));
+      const V luminance = LuminanceOf(d, est[0], est[1], est[2]);
+      if constexpr (kRecord) Record(*o.record, e, g, i, hn::AndNot(wanted, MaskOf(d, e.active[g], i)), luminance);
+      const V rest = hn::Max(zero, hn::Sub(total, luminance));
       hn::Store(hn::IfThenElse(wanted, rest, total), d, cuts.luminance[g] + i);
     }
     refine[g] = static_cast<uint16_t>(bits);
     any |= bits;
   }
   if (any != 0) {
-    AddNode(tree, accel, o, e.first_child, refine, &e, cuts);
-    AddNode(tree, accel, o, e.first_child + 1, refine, &e, cuts);
+    AddNode<kRecord>(tree, accel, o, e.first_child, refine, &e, cuts);
+    AddNode<kRecord>(tree, accel, o, e.first_child + 1, refine, &e, cuts);
   }
   cuts.release(index);
 }
@@ -229,13 +244,14 @@ HWY_INLINE void Prefetch(const CutEntry& e) {
   for (const auto& group : e.bound) __builtin_prefetch(group);
 }
 
-void GrowCuts(const LightTree& tree, const Accel& accel, const CutOptions& o, size_t count, LightCuts& cuts) {
+template <bool kRecord>
+void GrowCutsOf(const LightTree& tree, const Accel& accel, const CutOptions& o, size_t count, LightCuts& cuts) {
   uint16_t all[kCutGroups];
   for (size_t g = 0; g < kCutGroups; ++g) {
     const size_t in_group = count > g * kLanes ? std::min(kLanes, count - g * kLanes) : 0;
     all[g] = static_cast<uint16_t>((1u << in_group) - 1);
   }
-  for (const uint32_t root : tree.roots()) AddNode(tree, accel, o, root, all, nullptr, cuts);
+  for (const uint32_t root : tree.roots()) AddNode<kRecord>(tree, accel, o, root, all, nullptr, cuts);
   std::vector<uint32_t>& resting = cuts.resting;
   // Each node of the tree comes here at most twice: from the heap, and from among those that rest.
   uint32_t steps = 0;
@@ -247,7 +263,7 @@ void GrowCuts(const LightTree& tree, const Accel& accel, const CutOptions& o, si
       const uint32_t index = cuts.heap.back().entry;
       cuts.heap.pop_back();
       if (!cuts.heap.empty()) Prefetch(cuts.entry(cuts.heap.front().entry));
-      Refine(tree, accel, o, index, cuts);
+      Refine<kRecord>(tree, accel, o, index, cuts);
     }
     if (resting.empty()) break;
     if (cancelled()) return cuts.drop();
@@ -255,8 +271,12 @@ void GrowCuts(const LightTree& tree, const Accel& accel, const CutOptions& o, si
     const uint32_t index = resting.back();
     resting.pop_back();
     if (!resting.empty()) Prefetch(cuts.entry(resting.back()));
-    Refine(tree, accel, o, index, cuts);
+    Refine<kRecord>(tree, accel, o, index, cuts);
   }
+}
+
+void GrowCuts(const LightTree& tree, const Accel& accel, const CutOptions& o, size_t count, LightCuts& cuts) {
+  o.record != nullptr ? GrowCutsOf<true>(tree, accel, o, count, cuts) : GrowCutsOf<false>(tree, accel, o, count, cuts);
 }
 
 }  // namespace lumicut::HWY_NAMESPACE
@@ -265,6 +285,20 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace lumicut {
 HWY_EXPORT(GrowCuts);
+HWY_EXPORT(EstimateOf);
+
+uint32_t estimate_light(const Vpl& light, const Rgb& intensity, Falloff falloff, const PointBlock& block,
+                        uint32_t active, float* r, float* g, float* b) {
+  return HWY_DYNAMIC_DISPATCH(EstimateOf)(light, intensity, falloff, block, active, r, g, b);
+}
+
+uint32_t CutRecord::add(uint32_t node, uint32_t parent) {
+  const auto visit = static_cast<uint32_t>(visits.size());
+  visits.push_back({node, parent});
+  luminance.resize(visits.size() * kCutPoints, 0.0f);
+  if (parent != kNone && visits[parent].children++ == 0) visits[parent].first_child = visit;
+  return visit;
+}
 
 uint32_t LightCuts::allocate() {
   if (!free_.empty()) {

@@ -15,12 +15,28 @@ namespace lumicut {
 inline constexpr size_t kCutGroups = 4;
 inline constexpr size_t kCutPoints = kCutGroups * kLanes;
 
+// What points were given by each node of their cuts: the nodes that were looked at, parents first.
+struct CutRecord {
+  static constexpr uint32_t kNone = 0xffffffffu;
+  struct Visit {
+    uint32_t node, parent;         // of the light tree; among the visits, or kNone
+    uint32_t first_child = kNone;  // among the visits
+    uint32_t children = 0;         // visited ones, one after the other: those whose bound is above 0 for any point
+  };
+  std::vector<Visit> visits;
+  std::vector<float> luminance;  // [visit][point]: of the node where it is in the point's cut, else 0
+
+  void clear() { visits.clear(), luminance.clear(); }
+  uint32_t add(uint32_t node, uint32_t parent);
+};
+
 struct CutOptions {
   Falloff falloff;
   float error = 0.02f;  // largest share of a point's luminance that a cluster's bound may reach
   uint32_t max_cut = 0xffffffffu;
   uint32_t slot = 0;                   // of LightTree::representative
   const Progress* progress = nullptr;  // where it is cancelled, the cuts are left as they are
+  CutRecord* record = nullptr;         // to be filled, unless null
 };
 
 // A cluster in the cuts of the points in `active`.
@@ -29,7 +45,8 @@ struct alignas(64) CutEntry {
   uint32_t first_child, representative;
   Rgb intensity;
   uint16_t active[kCutGroups];
-  uint32_t lit;  // a bit each group whose estimates are not all 0; those of the others are not even written
+  uint32_t visit;  // of CutRecord
+  uint32_t lit;    // a bit each group whose estimates are not all 0; those of the others are not even written
   alignas(64) float bound[kCutGroups][kLanes];
   float estimate[3][kCutGroups][kLanes];  // radiance, shadows included; 0 at the other points of a group
 };
@@ -68,5 +85,10 @@ struct LightCuts {
   std::vector<uint32_t> free_;
   uint32_t used_ = 0;
 };
+
+// Radiance by a light of that intensity at the points in `active` of a block, without shadows: 0 at its others. Returns
+// the points that get any; where none does, nothing is written.
+uint32_t estimate_light(const Vpl& light, const Rgb& intensity, Falloff falloff, const PointBlock& block,
+                        uint32_t active, float* r, float* g, float* b);
 
 }  // namespace lumicut

@@ -7,6 +7,7 @@
 #include "core/rng.h"
 #include "integrators/integrator.h"
 #include "integrators/lightcuts/light_cuts.h"
+#include "integrators/lightcuts/reconstruction.h"
 
 namespace lumicut {
 
@@ -15,11 +16,14 @@ namespace {
 // Share of the `error` parameter that bounds one cluster. docs/integrators/README.md compares it with other methods.
 constexpr float kClusterShare = 0.75f;
 
+enum class ReconstructFrom { all, quarter, sixteenth };  // of the points have cuts of their own
+
 struct LightcutsParams {
   float error = 0.02f;
   uint32_t max_cut = 0;  // 0: no limit
   uint32_t representatives = 1;
   LightTree::Method tree = LightTree::Method::agglomerative;
+  ReconstructFrom reconstruction = ReconstructFrom::all;
 };
 
 class Lightcuts final : public Integrator {
@@ -31,6 +35,7 @@ class Lightcuts final : public Integrator {
     error_ = kClusterShare * own.error;
     max_cut_ = own.max_cut == 0 ? std::numeric_limits<uint32_t>::max() : own.max_cut;
     seed_ = params.common().seed;
+    stride_ = own.reconstruction == ReconstructFrom::all ? 0 : own.reconstruction == ReconstructFrom::quarter ? 4 : 16;
     const PhaseTimer timer(context.stats, "light tree");
     tree_ = LightTree::build(vpls.lights, {own.tree, 2.0f * scene.extent().radius(), own.representatives, seed_},
                              context.progress);
@@ -39,15 +44,14 @@ class Lightcuts final : public Integrator {
 
   void shade(const ShadePoints& points, std::span<Rgb> radiance, std::span<PointCounts> counts,
              ShadeContext context) const override {
+    if (stride_ > 0) return reconstruct(points, radiance, counts, context);
     parallel_chunks(points.size(), 4 * kCutPoints, [&](size_t begin, size_t end) {
       const auto cuts = std::make_unique<LightCuts>();
       Counters total;
       for (size_t first = begin; first < end; first += kCutPoints) {
         if (context.progress.cancelled()) return;
         const size_t count = std::min(kCutPoints, end - first);
-        CutOptions options{falloff_, error_, max_cut_, 0, &context.progress};
-        if (tree_.slot_count() > 1)
-          options.slot = Rng(seed_, Stage::representative, points.pixel[first], first).next_below(tree_.slot_count());
+        const CutOptions options = options_at(points, first, context);
         cuts->grow(tree_, scene_->accel(), options, points, first, count);
         for (size_t i = 0; i < count; ++i) {
           const size_t g = i / kLanes, k = i % kLanes;
@@ -64,12 +68,37 @@ class Lightcuts final : public Integrator {
   }
 
  private:
+  CutOptions options_at(const ShadePoints& points, size_t first, const ShadeContext& context) const {
+    CutOptions options{falloff_, error_, max_cut_, 0, &context.progress, nullptr};
+    if (tree_.slot_count() > 1)
+      options.slot = Rng(seed_, Stage::representative, points.pixel[first], first).next_below(tree_.slot_count());
+    return options;
+  }
+
+  void reconstruct(const ShadePoints& points, std::span<Rgb> radiance, std::span<PointCounts> counts,
+                   ShadeContext context) const {
+    std::vector<PointCounts> own(counts.empty() ? points.size() : 0);
+    PointCounts* work = counts.empty() ? own.data() : counts.data();
+    parallel_chunks(points.size(), Reconstruction::points_at_once(stride_), [&](size_t begin, size_t end) {
+      if (context.progress.cancelled()) return;
+      const auto by = std::make_unique<Reconstruction>(stride_);
+      by->shade(tree_, scene_->accel(), options_at(points, begin, context), points, begin, end, radiance.data(), work);
+      Counters total;
+      for (size_t i = begin; i < end; ++i)
+        total.clusters += work[i].clusters, total.rays += work[i].rays, total.bounds += work[i].bounds;
+      total.points += end - begin;
+      context.stats.add(total);
+    });
+    context.progress.check();
+  }
+
   const Scene* scene_ = nullptr;
   LightTree tree_;
   Falloff falloff_;
   float error_ = 0.02f;
   uint32_t max_cut_ = 0;
   uint64_t seed_ = 1;
+  size_t stride_ = 0;  // of points with cuts of their own; 0: all have one
 };
 
 ParamTable params() {
@@ -88,7 +117,12 @@ ParamTable params() {
           "", 1, 64),
       choice<&P::tree>("tree", "Light tree",
                        "How the lights are clustered: agglomerative makes the smallest cuts, the others are baselines",
-                       "", "agglomerative|divisive_3d|divisive_6d"));
+                       "", "agglomerative|divisive_3d|divisive_6d"),
+      choice<&P::reconstruction>(
+          "reconstruction", "Reconstruction cuts",
+          "One point of 4 or of 16 gets a cut of its own; those between take what it knows of visibility where that is "
+          "smooth",
+          "", "off|4|16"));
 }
 
 }  // namespace

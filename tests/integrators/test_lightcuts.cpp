@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 
 #include "tests/support/render.h"
@@ -71,6 +72,39 @@ TEST(Lightcuts, ImageDoesNotDependOnTheScaleOfTheScene) {
   for (float scale : {1.0f / 1024, 1024.0f}) EXPECT_LT(test::rmse_over_mean(image(scale), unit), 1e-5) << scale;
   // Others round otherwise, and a path or a cut may turn: still the same picture.
   for (float scale : {0.001f, 1000.0f}) EXPECT_LT(test::rmse_over_mean(image(scale), unit), 0.05) << scale;
+}
+
+TEST(Lightcuts, ReconstructionHalvesTheRaysAndStaysNearTheExhaustiveSum) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 10000);
+  const test::RenderOptions settings{.width = 160, .height = 120};
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}, settings),
+             plain = test::render(*scene, "lightcuts", vpls, {}, settings);
+  for (const char* points : {"4", "16"}) {
+    const auto frame = test::render(*scene, "lightcuts", vpls, {{"reconstruction", points}}, settings);
+    // Between its samples a point may see what none of them sees: no bound, but no more than the share itself here.
+    EXPECT_LT(test::mean_relative_error(frame.radiance, reference.radiance), 0.02) << points;
+    EXPECT_LT(frame.counters.rays, plain.counters.rays / 2) << points;
+    EXPECT_EQ(frame.counters.points, plain.counters.points) << points;
+    // Points with cuts of their own have bounds; a quarter or a sixteenth must, and those on edges.
+    EXPECT_LT(frame.counters.bounds, plain.counters.bounds / 2) << points;
+  }
+}
+
+TEST(Lightcuts, ReconstructionGivesTheSameImageOnOneAndFourThreads) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 3000);
+  for (const char* points : {"4", "16"})
+    for (const uint32_t samples : {1u, 3u}) {
+      const test::Settings parameters{{"reconstruction", points}, {"representatives", "4"}};
+      // 61 x 47 pixels: blocks and groups that are not full.
+      const auto one = test::render(*scene, "lightcuts", vpls, parameters,
+                                    {.width = 61, .height = 47, .samples = samples, .threads = 1}),
+                 four = test::render(*scene, "lightcuts", vpls, parameters,
+                                     {.width = 61, .height = 47, .samples = samples, .threads = 4});
+      EXPECT_EQ(std::memcmp(one.radiance.data(), four.radiance.data(), one.radiance.size() * sizeof(Rgb)), 0);
+      for (const Rgb& r : one.radiance) EXPECT_TRUE(std::isfinite(r.x) && r.x >= 0.0f);
+    }
 }
 
 TEST(Lightcuts, DegenerateLightsAreNoTrouble) {
