@@ -204,6 +204,15 @@ std::optional<BsdfSample> Bsdf::sample_specular(float choice, float u, float v, 
   return s;
 }
 
+// What leaves evenly leaves by the geometric normal: light paths see shading normals where camera paths see geometric
+// ones, and the reverse [lights/light_paths.cpp]. By the shortest rotation.
+static Vec3f turned(const Vec3f& direction, const Vec3f& from, const Vec3f& to) {
+  if (from == to) return direction;
+  const float c = dot(from, to);
+  const Vec3f axis = cross(from, to);
+  return direction * c + cross(axis, direction) + axis * (dot(axis, direction) / (1.0f + c));
+}
+
 std::optional<ScatterSample> Bsdf::scatter(Rng& rng) const {
   if (parameters_.model != LobeModel::ggx && !translucent()) return scatter_cosine(rng);
   const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float(), lobe = rng.next_float();
@@ -225,8 +234,10 @@ std::optional<ScatterSample> Bsdf::scatter(Rng& rng) const {
   }
   const auto shares = layer_shares();
   const size_t layer = layer_count_ > 1 ? layer_at(shares, rng.next_float()) : 0;
-  const auto s = PointBsdf(layers_[layer]).sample(lobe, u, v);
+  auto s = PointBsdf(layers_[layer]).sample(lobe, u, v);
   const uint32_t side = side_of(layer);
+  if (s && (s->flags & kGlossy) == 0)
+    s->direction = turned(s->direction, layers_[layer].normal, side == kTransmitted ? -side_ : side_);
   if (!s || (side == kTransmitted) != (dot(s->direction, side_) < 0.0f)) return {};
   return ScatterSample{s->direction, s->weight, 1.0f / ((survive - p_specular) * shares[layer]),
                        side | (s->flags & kGlossy)};
@@ -243,7 +254,7 @@ std::optional<ScatterSample> Bsdf::scatter_cosine(Rng& rng) const {
   ScatterSample s;
   s.flags = kReflected;
   if (choice < p_diffuse) {
-    s.direction = sample_cosine_hemisphere(normal_, u, v);
+    s.direction = sample_cosine_hemisphere(side_, u, v);  // as turned() says
     s.weight = kd, s.factor = 1.0f / p_diffuse;
   } else {
     const float n = parameters_.exponent;

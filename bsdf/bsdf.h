@@ -87,7 +87,7 @@ class Bsdf {
   std::optional<BsdfSample> sample_specular(float choice, float u, float v, Passage passage = Passage::refracted) const;
   // One direction out of all lobes for a light path, with Russian roulette by what they reflect, which keeps the flux of
   // all paths alike but for that factor of refraction: here it is, so that a single sheet looks as camera paths see it.
-  // Straight through glass, where shadows pass.
+  // Straight through glass, where shadows pass. What leaves evenly does so by the geometric normal.
   std::optional<ScatterSample> scatter(Rng& rng) const;
   // Of a path behind the first surface that lights are sampled at: straight through glass, where shadows pass.
   PathChoice choose(Rng& rng) const;

@@ -31,6 +31,30 @@ struct LightPath {
   }
 };
 
+// Camera paths meet a surface by its geometric normal and have it lit by the shading one; light paths do the reverse. With
+// these factors both see one image. [Veach 1997, 5.3] Of grazing light, where few paths arrive, what is above is lost.
+constexpr float kMostTilted = 32.0f;
+
+// Of what leaves evenly, by the geometric normal: virtual lights, and paths that go on.
+float lit_by_shading_normal(const SurfaceInteraction& at) {
+  const float geometric = std::abs(dot(at.geometric_normal, at.to_viewer));
+  const float shading = std::max(0.0f, dot(at.bsdf.normal(), at.to_viewer));
+  return shading < kMostTilted * geometric ? shading / geometric : kMostTilted;
+}
+
+// Of a path that goes on: a sharper lobe's direction was drawn by the shading normal.
+float scattered_by_shading_normal(const SurfaceInteraction& at, const ScatterSample& next) {
+  if ((next.flags & kStraight) != 0) return 1.0f;
+  if ((next.flags & (kSpecular | kGlossy)) == 0) return lit_by_shading_normal(at);
+  const auto cosines = [&](const Vec3f& direction) {
+    return std::pair{std::abs(dot(at.geometric_normal, direction)), std::abs(dot(at.bsdf.normal(), direction))};
+  };
+  const auto [geometric_in, shading_in] = cosines(at.to_viewer);
+  const auto [geometric_out, shading_out] = cosines(next.direction);
+  const float up = shading_in * geometric_out, down = geometric_in * shading_out;
+  return up < kMostTilted * down ? up / down : kMostTilted;
+}
+
 // Follows paths [first, last) in step, so that rays are traced in batches.
 std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
                                  const CameraImportance* importance, uint64_t first, uint64_t last) {
@@ -80,7 +104,7 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
         lit = d2 / (d2 + path.disk_radius * path.disk_radius);
       }
       Vpl light;
-      light.position = at.position, light.kind = VplKind::oriented, light.normal = at.bsdf.normal();
+      light.position = at.position, light.kind = VplKind::oriented, light.normal = at.side();
       light.offset = at.offset;
       light.group = path.group;
       const auto leave = [&](const Rgb& intensity) {
@@ -94,9 +118,10 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
         vpls.push_back({ids[i], path.emitter, light});
       };
       if (!path.first() || path.reach.lights(kDiffuseRay)) {
-        leave(at.bsdf.lambertian_intensity(path.flux * lit));
+        const Rgb received = path.flux * (lit * lit_by_shading_normal(at));
+        leave(at.bsdf.lambertian_intensity(received));
         light.normal = -light.normal;
-        leave(at.bsdf.passed_intensity(path.flux * lit));
+        leave(at.bsdf.passed_intensity(received));
       }
       const auto next = at.bsdf.scatter(path.rng);
       if (!next) continue;
@@ -105,7 +130,7 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
       if ((next->flags & kStraight) == 0) path.kind = kDiffuseRay, path.flux *= lit, path.disk_radius = 0.0f;
       path.absorption = at.bsdf.absorption_after(next->flags, path.absorption);
       path.origin = at.bsdf.origin(next->flags), path.direction = next->direction;
-      path.flux = path.flux * next->weight * next->factor;
+      path.flux = path.flux * next->weight * (next->factor * scattered_by_shading_normal(at, *next));
       if (!(max_component(path.flux) > 0.0f) || !is_finite(path.flux)) continue;
       paths[alive] = path;
       ids[alive++] = ids[i];

@@ -1,5 +1,6 @@
 #include "lights/light_spacing.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -35,8 +36,26 @@ float LightSpacing::at(const Vec3f& position, BallQueryTree::Scratch& scratch) c
   return distance(place, 0, scratch);
 }
 
-float LightSpacing::of_light(size_t i, BallQueryTree::Scratch& scratch) const {
-  return distance(&places_[3 * i], 1, scratch);
+float LightSpacing::of_light(size_t i, size_t beside, BallQueryTree::Scratch& scratch) const {
+  const double* place = &places_[3 * i];
+  if (beside == 0) return distance(place, 1, scratch);
+  const size_t count = tree_.size(), first = i - std::min(i, beside), last = std::min(count, i + beside + 1);
+  const size_t others = count - (last - first), wanted = std::min(kNeighbour, others);
+  if (wanted == 0) return lonely_;
+  std::vector<uint32_t> index;
+  std::vector<double> dist2;
+  for (size_t ask = 2 * kNeighbour;; ask *= 2) {
+    index.resize(ask), dist2.resize(ask);
+    const size_t found = tree_.nearest(place, ask, index.data(), dist2.data(), scratch);
+    size_t left = wanted;
+    for (size_t k = 0; k < found; ++k) {
+      if (index[k] >= first && index[k] < last) continue;
+      if (--left > 0) continue;
+      const double share = static_cast<double>(others) / static_cast<double>(count);
+      return static_cast<float>(
+          std::sqrt(dist2[k] * share * static_cast<double>(kNeighbour) / static_cast<double>(wanted)));
+    }
+  }
 }
 
 }  // namespace lumicut

@@ -22,9 +22,11 @@ class LightSpacing {
   // Distance within which kNeighbour lights lie around a place; where there are fewer, as if they lay as densely
   // further out.
   float at(const Vec3f& position, BallQueryTree::Scratch& scratch) const;
-  // The same around light i, itself not counted: of lights that were drawn independently both have one distribution
-  // (Mecke's formula), so that what a clamp takes from them and what is given back elsewhere add up to all.
-  float of_light(size_t i, BallQueryTree::Scratch& scratch) const;
+  // The same around light i, itself and the `beside` lights before and after it not counted, for which the others stand
+  // in. Of lights that were drawn independently both have one distribution (Mecke's formula), so that what a clamp takes
+  // from them and what is given back elsewhere add up to all. Lights of one path are no such lights (they often lie in the
+  // lamp that it started in), and stand beside each other.
+  float of_light(size_t i, size_t beside, BallQueryTree::Scratch& scratch) const;
 
  private:
   float distance(const double* place, size_t itself, BallQueryTree::Scratch& scratch) const;

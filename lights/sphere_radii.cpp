@@ -14,7 +14,7 @@ void make_spheres(std::span<Vpl> lights, float scale, float typical_radius, cons
     BallQueryTree::Scratch scratch;
     for (size_t i = begin; i < end; ++i) {
       lights[i].kind = VplKind::sphere;
-      lights[i].radius() = scale * std::max(spacing.of_light(i, scratch), least);
+      lights[i].radius() = scale * std::max(spacing.of_light(i, 0, scratch), least);
     }
   });
 }

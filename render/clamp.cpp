@@ -35,6 +35,10 @@ float Clamp::from_spacing2(float spacing) const {
 }
 
 void Clamp::set_on(VplSet& set, const Progress& progress) const {
+  // More than nearly any light path leaves; of few lights an eighth, and of a host's own nothing is known.
+  constexpr size_t kOnePath = 32;
+  const size_t of_paths = set.lights.size() - set.direct;
+  const size_t beside = set.light_paths > 0 ? std::min(kOnePath, of_paths / 16) : 0;
   parallel_chunks(set.lights.size(), 1024, [&](size_t begin, size_t end) {
     progress.check();
     BallQueryTree::Scratch scratch;
@@ -49,7 +53,7 @@ void Clamp::set_on(VplSet& set, const Progress& progress) const {
       else if (i < set.direct)
         v.clamp2 = static_cast<float>(of_emitters_ * static_cast<double>(v.cell) * std::numbers::inv_pi);
       else if (spacing_ != nullptr)
-        v.clamp2 = from_spacing2(spacing_->of_light(i - set.direct, scratch));
+        v.clamp2 = from_spacing2(spacing_->of_light(i - set.direct, beside, scratch));
     }
   });
 }

@@ -23,6 +23,8 @@ struct SurfaceInteraction : SurfaceHit {
   SurfaceInteraction(const SurfaceHit& hit, const Rgb& radiance, const BsdfParameters& parameters,
                      const SurfaceView& view)
       : SurfaceHit(hit), to_viewer(view.to_viewer), emitted(radiance), bsdf(parameters, view) {}
+  // The geometric normal on the viewer's side.
+  Vec3f side() const { return dot(geometric_normal, to_viewer) < 0.0f ? -geometric_normal : geometric_normal; }
   Vec3f to_viewer;  // unit, away from the surface
   Rgb emitted;      // radiance towards the viewer
   Bsdf bsdf;
