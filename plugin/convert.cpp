@@ -569,7 +569,9 @@ VplSet to_vpls(const lumicut_vpl_set& in, const LightProfiles& known) {
   if (in.emitter_samples < areas)
     c.fail("emitter_samples", number_text(in.emitter_samples) + " is less than the " + number_text(areas) +
                                   " lights of LUMICUT_SOURCE_AREA");
-  set.light_paths = in.origins != nullptr ? in.light_paths : 0, set.extended = in.emitter_samples;
+  // Where origins are known, so is that lights of one path follow each other, however many paths there were.
+  set.light_paths = in.origins != nullptr ? std::max<uint64_t>(1, in.light_paths) : 0;
+  set.extended = in.emitter_samples;
   return set;
 }
 

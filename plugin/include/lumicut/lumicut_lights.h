@@ -30,8 +30,8 @@ typedef struct lumicut_vpl_set {
   uint32_t reserved; /* 0 */
   uint64_t count;
   const lumicut_vpl* lights;
-  const lumicut_vpl_origin* origins; /* as many; NULL: nothing is known */
-  uint64_t light_paths;              /* that were traced; above 0: lights of one follow each other, which clamps heed */
+  const lumicut_vpl_origin* origins; /* as many, lights of one path after each other; NULL: nothing is known */
+  uint64_t light_paths;              /* that were traced; for the statistics alone */
   uint64_t emitter_samples;          /* that were drawn on emitters with extent, those that gave no light included */
 } lumicut_vpl_set;
 
