@@ -35,15 +35,23 @@ struct Blocks {
   std::vector<uint32_t> origin;  // of each point, in the batch
   std::vector<Block> blocks;
 
+  // `largest`: points of a block. Below kSamples all are samples, else so many spread ones.
   Blocks(const ShadePoints& in, size_t largest);
+  bool all_samples() const { return all_samples_; }
+  size_t sample_count(const Block& b) const { return all_samples_ ? b.count : kSamples; }
+  size_t sample(const Block& b, size_t s) const {
+    return all_samples_ ? std::min<size_t>(s, b.count - 1) : s * b.count / kSamples;
+  }
 
  private:
   void split(const ShadePoints& in, std::vector<uint32_t>& order, size_t begin, size_t end, size_t largest,
              bool inside);
   void close(const ShadePoints& in);
+
+  bool all_samples_;
 };
 
-Blocks::Blocks(const ShadePoints& in, size_t largest) {
+Blocks::Blocks(const ShadePoints& in, size_t largest) : all_samples_(largest < kSamples) {
   std::vector<uint32_t> order(in.size());
   std::iota(order.begin(), order.end(), 0u);
   points.reserve(in.size() + in.size() / 8);
@@ -62,7 +70,7 @@ void Blocks::split(const ShadePoints& in, std::vector<uint32_t>& order, size_t b
     b.first = static_cast<uint32_t>(origin.size());
     blocks.push_back(b);
   }
-  bool done = end - begin <= kLanes;
+  bool done = end - begin <= kLanes && (inside || opens);
   if (!done) {
     Aabb box, turn;
     for (size_t i = begin; i < end; ++i) box.extend(in.position_at(order[i])), turn.extend(in.normal_at(order[i]));
@@ -103,7 +111,7 @@ void Blocks::close(const ShadePoints& in) {
   b.axis = length2(sum) > 0.0f ? normalize(sum) : Vec3f{0, 0, 1};
   for (uint32_t i = b.first; i < b.first + b.count; ++i)
     b.cos_half = std::min(b.cos_half, dot(b.axis, in.normal_at(origin[i])));
-  for (size_t s = 0; s < kSamples; ++s) samples.push(in.get(origin[b.first + s * b.count / kSamples]));
+  for (size_t s = 0; s < kSamples; ++s) samples.push(in.get(origin[b.first + sample(b, s)]));
   const SurfacePoint last = in.get(origin.back());
   while (origin.size() % kLanes != 0) points.push(last), origin.push_back(kPadding);
 }
@@ -145,6 +153,7 @@ struct Workspace {
 
 enum class Visibility { sampling, full };
 enum class LocalVisibility { representative, cubemap };
+enum class Clustering { exact, printed };
 
 struct WspdParams {
   float separation = 0.25f, bright = 0.01f;
@@ -152,6 +161,7 @@ struct WspdParams {
   LocalVisibility local_visibility = LocalVisibility::representative;
   float normal_threshold = 0.01f;
   uint32_t block = 256;
+  Clustering clusters = Clustering::exact;
 };
 
 class Wspd final : public Integrator {
@@ -211,7 +221,8 @@ class Wspd final : public Integrator {
     bright_ = own.bright;
     sampling_ = own.visibility == Visibility::sampling;
     cubemaps_ = own.local_visibility == LocalVisibility::cubemap;
-    largest_block_ = own.block;
+    printed_ = own.clusters == Clustering::printed;
+    largest_block_ = printed_ ? 1 : own.block;
   }
 
   void tell(Stats& stats) const {
@@ -229,14 +240,18 @@ class Wspd final : public Integrator {
     std::fill(work.sum.b, work.sum.b + kMaxLit, 0.0f);
     work.clusters.clear();
     uint32_t tests = 0;
-    collect(blocks, b, work, tests, progress);
-    split_bright(blocks, b, work, progress);
+    if (printed_) {
+      collect_as_printed(blocks, b, work, tests, progress);
+    } else {
+      collect(blocks, b, work, tests, progress);
+      split_bright(blocks, b, work, progress);
+    }
 
     uint32_t used = 0;
     for (size_t c = 0; c < work.clusters.size(); ++c) {
       if (c % 64 == 0 && progress.cancelled()) return;
       const Cluster& cluster = work.clusters[c];
-      const bool agreed = sampling_ && !cluster.strong && cluster.lit >= kSamples / 2;
+      const bool agreed = blocks.all_samples() || (sampling_ && !cluster.strong && cluster.lit >= kSamples / 2);
       if ((agreed && cluster.seen == 0) || cluster.share == 0.0f) continue;
       ++used;
       if (agreed && cluster.seen == cluster.lit)
@@ -284,6 +299,44 @@ class Wspd final : public Integrator {
       for (const uint32_t v : tree_.pairs(w)) add(v);
   }
 
+  // Alg. 2 as printed, for a block of one point: clusters that are further from the light than d / ε stay, others are
+  // split until well-separated from the point; and all until none gives the light more than its share, by power over
+  // squared distance, which the thesis does beforehand for each pair. [thesis secs. 2.2, 2.3]
+  void collect_as_printed(const Blocks& blocks, size_t b, Workspace& work, uint32_t& tests,
+                          const Progress& progress) const {
+    const Blocks::Block& block = blocks.blocks[b];
+    for (const uint32_t d : tree_.distant()) estimate(blocks, b, d, work);
+    if (tree_.root() == WspdNode::kNone) return;
+    const Vec3f point = blocks.points.position_at(block.first);
+    const uint32_t leaf = tree_.near_leaf(point);
+    const Vec3f light = tree_.node(leaf).center;
+    const float limit = length(point - light) / separation_;
+    const auto given = [&](const WspdNode& n) {
+      return n.power / std::max({length2(light - n.center), n.radius * n.radius, 1e-30f});
+    };
+    float received = 0.0f;
+    for (uint32_t w = leaf; w != WspdNode::kNone; w = tree_.node(w).parent)
+      for (const uint32_t v : tree_.pairs(w)) received += given(tree_.node(v));
+    estimate(blocks, b, leaf, work);
+    for (uint32_t w = leaf; w != WspdNode::kNone && !progress.cancelled(); w = tree_.node(w).parent)
+      for (const uint32_t v : tree_.pairs(w)) {
+        work.stack.assign(1, v);
+        while (!work.stack.empty()) {
+          const uint32_t top = work.stack.back();
+          work.stack.pop_back();
+          const WspdNode& n = tree_.node(top);
+          ++tests;
+          if (behind(block, n)) continue;
+          const bool apart =
+              length(light - n.center) - n.radius >= limit || well_separated(block.box, n, point_separation_);
+          if (n.leaf() || (apart && given(n) <= bright_ * received))
+            estimate(blocks, b, top, work);
+          else
+            for (uint32_t c = 0; c < n.child_count; ++c) work.stack.push_back(n.first_child + c);
+        }
+      }
+  }
+
   // What the cluster gives to the block's samples; it joins the clustering unless that is certainly nothing.
   void estimate(const Blocks& blocks, size_t b, uint32_t node, Workspace& work) const {
     const Blocks::Block& block = blocks.blocks[b];
@@ -304,7 +357,7 @@ class Wspd final : public Integrator {
     }
     light_block(lights, 1.0f, falloff_, blocks.samples, b * kSamples, kSamples, false, work.part);
     uint32_t lit[kSamples];
-    for (uint32_t s = 0; s < kSamples; ++s) {
+    for (uint32_t s = 0; s < blocks.sample_count(block); ++s) {
       c.luminance[s] = luminance({work.part.r[s], work.part.g[s], work.part.b[s]});
       if (!(c.luminance[s] > 0.0f)) continue;
       const Vec3f p = blocks.samples.position_at(b * kSamples + s);
@@ -314,7 +367,7 @@ class Wspd final : public Integrator {
     if (c.lit > 0) {
       scene_->accel().occluded_from_point(c.origin, work.x, work.y, work.z, c.lit, work.occluded);
       for (uint32_t i = 0; i < c.lit; ++i) {
-        ++work.rays[lit[i] * block.count / kSamples];
+        ++work.rays[blocks.sample(block, lit[i])];
         if (work.occluded[i] != 0) continue;
         ++c.seen;
         c.seen_by |= 1u << lit[i];
@@ -344,7 +397,7 @@ class Wspd final : public Integrator {
     float radiance[kSamples] = {}, mean = 0.0f;
     for (const Cluster& c : work.clusters)
       for (size_t s = 0; s < kSamples; ++s) radiance[s] += c.seen_by >> s & 1 ? c.luminance[s] * c.share : 0.0f;
-    for (const float r : radiance) mean += r / kSamples;
+    for (const float r : radiance) mean += r / static_cast<float>(blocks.sample_count(blocks.blocks[b]));
     float limit[kSamples];
     for (size_t s = 0; s < kSamples; ++s) limit[s] = bright_ * std::max(radiance[s], 0.25f * mean);
     // Shadows have no say in what is split: to split what is seen and leave what is hidden would correct clusters whose
@@ -409,7 +462,7 @@ class Wspd final : public Integrator {
   WspdTree tree_;
   Falloff falloff_;
   float separation_ = 0.25f, point_separation_ = 1.0f / 3.0f, bright_ = 0.01f;
-  bool sampling_ = true, cubemaps_ = true;
+  bool sampling_ = true, cubemaps_ = true, printed_ = false;
   size_t largest_block_ = kBlock;
 };
 
@@ -431,7 +484,11 @@ ParamTable params() {
           "", "representative|cubemap"),
       number<&P::normal_threshold>("normal_threshold", "Normal threshold",
                                    "Lights of a cluster whose normals differ by less count as one", "", 0, 2),
-      number<&P::block>("block", "Largest block", "Most points that share a clustering", "points", 16, 256));
+      number<&P::block>("block", "Largest block", "Most points that share a clustering", "points", 1, 256),
+      choice<&P::clusters>("clusters", "Clusters",
+                           "exact: split until well-separated from the points, and where bright at them; printed: the "
+                           "thesis's Alg. 2, point by point, bright clusters split by estimates between pairs",
+                           "", "exact|printed"));
 }
 
 }  // namespace

@@ -90,6 +90,31 @@ TEST(Wspd, EqualsExhaustiveWithoutClusters) {
   EXPECT_LT(test::rmse_over_mean(frame.radiance, reference.radiance), 2e-3);
 }
 
+// A point alone is its own sample: no light is lost that reaches it, and visibility is its own.
+TEST(Wspd, PointByPointEqualsExhaustiveWithoutClusters) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 1000);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}, {.width = 32, .height = 24});
+  for (const char* clusters : {"exact", "printed"}) {
+    const auto frame = test::render(*scene, "wspd", vpls, {{"bright", "0"}, {"block", "1"}, {"clusters", clusters}},
+                                    {.width = 32, .height = 24});
+    EXPECT_LT(test::mean_relative_error(frame.radiance, reference.radiance), 1e-5) << clusters;  // order of summation
+    EXPECT_LE(frame.counters.rays, 2 * reference.counters.rays) << clusters;  // clusters that are split are asked too
+  }
+}
+
+TEST(Wspd, Algorithm2AsPrintedIsNearTheExhaustiveSumAndTheSameOnAnyNumberOfThreads) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 5000);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}, {.width = 32, .height = 24});
+  const test::Settings printed{{"clusters", "printed"}};
+  const auto one = test::render(*scene, "wspd", vpls, printed, {.width = 32, .height = 24, .threads = 1}),
+             four = test::render(*scene, "wspd", vpls, printed, {.width = 32, .height = 24, .threads = 4});
+  EXPECT_TRUE(same_bits(one.radiance, four.radiance));
+  EXPECT_LT(test::mean_relative_error(one.radiance, reference.radiance), 0.05);
+  EXPECT_LT(one.counters.rays, reference.counters.rays / 2);
+}
+
 TEST(Wspd, ErrorFallsWithTheSeparation) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 10000);
