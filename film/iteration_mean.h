@@ -30,6 +30,11 @@ class IterationMean {
   // luminance, or of a tenth of the image's mean where that is larger. Infinite before two passes.
   double error(const Film& mean, uint64_t passes) const;
 
+  // Of a pixel's luminance, over `passes` >= 2.
+  double variance(uint32_t x, uint32_t y, uint64_t passes) const {
+    return sums_[index(x, y)].squares / static_cast<double>(passes - 1);
+  }
+
   // Of each pixel, rows from the top; empty where it is not denoised.
   std::span<const ResidualSums> residuals() const { return residuals_; }
 

@@ -20,7 +20,8 @@ struct ClampCompensation::Search {
     float travelled = 0.0f;  // from there to the ray's origin
     Rgb absorption{};        // on the ray's way, for each unit of length
     uint32_t passages = 0;
-    Rgb gloss{};  // the part of `weight` that virtual lights of bounced light leave to it
+    Rgb gloss{};         // the part of `weight` that virtual lights of bounced light leave to it
+    float share = 1.0f;  // of what it brings, that counts: its point has several
   };
   std::vector<RayHit> rays;
   std::vector<Carried> carried;
@@ -54,7 +55,8 @@ void ClampCompensation::find_lights(const Search& search, size_t ray, TracedPoin
     const float distance = c.travelled + seen.t;
     const float share = nearby_ != nullptr ? nearby_->light_share(c.from, seen.light, distance, c.pdf)
                                            : lost_at(search, r.ray.org + r.ray.dir * seen.t, distance);
-    if (share > 0.0f) hits.add(c.weight * seen.radiance * share, c.pixel, scene_.lights()[seen.light].group);
+    if (share > 0.0f)
+      hits.add(c.weight * seen.radiance * (share * c.share), c.pixel, scene_.lights()[seen.light].group);
   });
 }
 
@@ -70,18 +72,18 @@ void ClampCompensation::find_surface(Search& search, size_t ray, TracedPoints& h
     const float share = mesh_light(scene_.meshes()[at.mesh]) == MeshLight::by_rays ? 1.0f
                         : nearby_ != nullptr ? nearby_->triangle_share(c.from, r.hit, distance, c.pdf)
                                              : lost_at(search, at.position, distance);
-    if (share > 0.0f) hits.add(at.emitted * weight * share, c.pixel, scene_.meshes()[at.mesh].group);
+    if (share > 0.0f) hits.add(at.emitted * weight * (share * c.share), c.pixel, scene_.meshes()[at.mesh].group);
   }
   // Mirrors and glass show it what is behind them: no virtual light shines by way of those, except straight on.
-  if (auto next =
-          start_chain(at.bsdf, weight, c.pixel, c.rng, {c.passages, Passage::straight, r.ray.mask, c.absorption, 0})) {
+  if (auto next = start_chain(at.bsdf, weight, c.pixel, c.rng,
+                              {c.passages, Passage::straight, r.ray.mask, c.absorption, 0, c.share})) {
     if (!next->straight) {
       if (!direct_) search.chains.push_back(*next);
     } else if (c.passages < kMostStraight) {
       RayHit& on = search.next_rays.emplace_back();
       on.ray.org = next->origin, on.ray.dir = next->direction, on.ray.mask = next->state.kind;
       search.next_carried.push_back({next->throughput, c.pixel, next->rng, c.pdf, c.from, distance,
-                                     next->state.absorption, c.passages + 1, c.gloss});
+                                     next->state.absorption, c.passages + 1, c.gloss, c.share});
     }
   }
   if (direct_ || at.bsdf.layers().empty()) return;
@@ -95,33 +97,44 @@ void ClampCompensation::find_surface(Search& search, size_t ray, TracedPoints& h
     // Chance decides by what the surface still shows, so that few points cost a whole sum of lights.
     const float survive = std::min(1.0f, max_component(PointBsdf(point).albedo() * weight));
     if (!(rng.next_float() < survive)) continue;
-    point.attenuate(weight / survive);
+    point.attenuate(weight / survive * c.share);
     hits.found.push_back(point);
   }
 }
 
-void ClampCompensation::trace(const ShadePoints& points, uint32_t level, const Progress& progress, TracedPoints& hits,
-                              Counters& counters) const {
+void ClampCompensation::trace(const ShadePoints& points, uint32_t level, std::span<const uint8_t> rays_of_pixel,
+                              const Progress& progress, TracedPoints& hits, Counters& counters) const {
   Search search;
   for (size_t i = 0; i < points.size(); ++i) {
     if (i % 4096 == 0) progress.check();
     const SurfacePoint point = points.get(i);
+    const uint32_t rays = rays_of_pixel.empty() ? 1u : rays_of_pixel[point.pixel];
     Rng rng = rng_at_point(scene_, point, hash64(seed_, level), Stage::compensation);
     const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float();
-    const auto s = PointBsdf(point).sample(choice, u, v);
-    if (!s || !is_finite(s->weight)) continue;
-    RayHit ray;
-    ray.ray.org = point.position, ray.ray.dir = s->direction, ray.ray.mask = ray_kind(s->flags);
-    search.rays.push_back(ray);
-    search.carried.push_back({s->weight,
-                              point.pixel,
-                              rng,
-                              s->pdf,
-                              point.position,
-                              0.0f,
-                              {},
-                              0,
-                              trace_gloss_ ? traced_part(point, s->direction) : Rgb{}});
+    const uint64_t seed = rays > 1 ? Rng(rng).next_u32() : 0;
+    for (uint32_t k = 0; k < rays; ++k) {
+      // Even in the cube for any number. [Roberts 2018: R3]
+      const auto step = [k](float x, double by) {
+        const double at = static_cast<double>(x) + k * by;
+        return static_cast<float>(std::min(at - std::floor(at), 0.99999994));
+      };
+      const auto s = PointBsdf(point).sample(step(choice, 0.8191725133961645), step(u, 0.6710436067037893),
+                                             step(v, 0.5497004779019703));
+      if (!s || !is_finite(s->weight)) continue;
+      RayHit ray;
+      ray.ray.org = point.position, ray.ray.dir = s->direction, ray.ray.mask = ray_kind(s->flags);
+      search.rays.push_back(ray);
+      search.carried.push_back({s->weight,
+                                point.pixel,
+                                k == 0 ? rng : Rng(hash64(seed, k), Stage::compensation),
+                                s->pdf,
+                                point.position,
+                                0.0f,
+                                {},
+                                0,
+                                trace_gloss_ ? traced_part(point, s->direction) : Rgb{},
+                                1.0f / static_cast<float>(rays)});
+    }
   }
   while (!search.rays.empty()) {
     trace_in_parts(std::span(search.rays), progress, [&](std::span<RayHit> part) { scene_.accel().intersect(part); });

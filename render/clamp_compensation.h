@@ -3,6 +3,8 @@
 // on another: virtual lights stand for what is reflected evenly, whatever the direction.
 #pragma once
 
+#include <span>
+
 #include "core/stats.h"
 #include "lights/light_surfaces.h"
 #include "render/clamp.h"
@@ -20,10 +22,10 @@ class ClampCompensation {
   ClampCompensation(const Scene& scene, const Clamp& clamp, const NearbyLights* nearby, bool spheres, bool trace_gloss,
                     bool direct, uint64_t seed);
 
-  // One ray from each point (unless it is cut short by chance, or the point is black). `level` counts the surfaces since
-  // the camera. Appends to `hits`. Deterministic: numbers belong to the places of points. Throws Error(cancelled).
-  void trace(const ShadePoints& points, uint32_t level, const Progress& progress, TracedPoints& hits,
-             Counters& counters) const;
+  // Rays from each point (unless they are cut short by chance, or the point is black): as many as `rays` has for its pixel,
+  // or one where it is empty. `level` counts the surfaces since the camera. Appends to `hits`. Deterministic: numbers belong to the places of points. Throws Error(cancelled).
+  void trace(const ShadePoints& points, uint32_t level, std::span<const uint8_t> rays, const Progress& progress,
+             TracedPoints& hits, Counters& counters) const;
 
  private:
   struct Search;  // of one call

@@ -135,7 +135,12 @@ class Batch {
   }
 
   // The points of the camera, and those that rays from them find.
-  void shade(const NearbyLights* nearby, const ClampCompensation* compensation, ShadeContext context) {
+  // `rays`: of compensation, from each point of a pixel of the crop.
+  void shade(const NearbyLights* nearby, const ClampCompensation* compensation, std::span<const uint8_t> rays,
+             ShadeContext context) {
+    if (!rays.empty())
+      for (const auto& [x, y] : pixels_)
+        rays_.push_back(rays[size_t{y - options_.crop.y0} * options_.crop.width() + (x - options_.crop.x0)]);
     light_.assign(methods_.size(), std::vector<Rgb>(pixels_.size()));
     counts_.assign(pixels_.size(), {});
     if (options_.denoise) residual_.assign(pixels_.size(), {});
@@ -226,7 +231,9 @@ class Batch {
       TracedPoints hits;
       if (nearby != nullptr)
         nearby->trace(*points, {level, compensation != nullptr, false}, context.progress, hits, counters);
-      if (compensation != nullptr) compensation->trace(*points, level, context.progress, hits, counters);
+      if (compensation != nullptr)
+        compensation->trace(*points, level, level == 1 ? std::span<const uint8_t>(rays_) : std::span<const uint8_t>(),
+                            context.progress, hits, counters);
       context.stats.add(counters);
       for (size_t i = 0; i < hits.light.size(); ++i) light[slot(hits.group[i])][hits.pixel[i]] += hits.light[i];
       if (noise != Noise::none)
@@ -380,6 +387,7 @@ class Batch {
   TracedPoints seen_;                    // by way of mirrors and glass
   std::vector<std::vector<Rgb>> light_;  // of each method: reflected, summed over a pixel's samples
   std::vector<float> illuminance_;       // summed over a pixel's samples
+  std::vector<uint8_t> rays_;            // of compensation, from each point of a pixel; none: one
   std::vector<Rgb> residual_;            // of what is in light_, summed over a pixel's samples
   std::optional<FeatureTracer> features_;
   std::vector<Vec3f> counts_;  // clusters, rays, bounds
@@ -450,7 +458,7 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
                       seen_lamps ? &*seen_lamps : nullptr);
           for (size_t t = batches[b].first; t < batches[b].second; ++t) batch.add_tile(tiles[t]);
           batch.collect(context);
-          batch.shade(light.nearby, compensation ? &*compensation : nullptr, context);
+          batch.shade(light.nearby, compensation ? &*compensation : nullptr, light.rays, context);
           context.progress.check();
           batch.write(film);
           context.progress.advance(batch.pixel_count());

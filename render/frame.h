@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 
 #include "film/film.h"
 #include "film/pixel_filter.h"
@@ -48,6 +49,7 @@ struct GroupMethod {
 struct FrameLight {
   const NearbyLights* nearby = nullptr;  // null: the clamp keeps what it takes from emitters
   const Clamp* compensated = nullptr;    // its loss is brought back by rays; null: it is not
+  std::span<const uint8_t> rays = {};    // of those, from each point of a pixel of the crop; none: one
   bool spheres = false;                  // virtual lights are, and lose nothing by it
   bool trace_gloss = false;              // rays bring a part of the gloss of bounced light [traced_gloss.h]
 };

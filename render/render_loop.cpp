@@ -6,6 +6,7 @@
 #include "core/current_work.h"
 #include "film/denoise.h"
 #include "render/checkpoint.h"
+#include "render/compensation_rays.h"
 #include "render/limited_lights.h"
 #include "render/traced_gloss.h"
 
@@ -153,10 +154,13 @@ void RenderLoop::render_iterations(Progress& progress, Stats& stats,
     const Prepared& prepared = *preparation_.prepared;
     FrameOptions frame = frame_options(prepared);
     frame.camera_samples = {preparation_.params.common().seed, uint64_t{done} * frame.samples};
+    FrameLight light = frame_light(prepared);
+    std::vector<uint8_t> rays;
+    if (light.compensated != nullptr) light.rays = rays = compensation_rays(mean, film_, done, progress);
     {
       const PhaseTimer timer(stats, "render");
-      render_frame(scene_, methods(prepared, of_groups, progress, stats), frame, frame_light(prepared), *frame_film,
-                   {progress, stats}, [&](const Rect& tile) {
+      render_frame(scene_, methods(prepared, of_groups, progress, stats), frame, light, *frame_film, {progress, stats},
+                   [&](const Rect& tile) {
                      {
                        const std::lock_guard lock(film_mutex_);
                        mean.add(*frame_film, tile, uint64_t{done} + 1, film_);

@@ -24,7 +24,7 @@ std::optional<ChainRay> start_chain(const Bsdf& bsdf, const Rgb& throughput, uin
                   rng,
                   {state.bounces + 1, state.passage, ray_kind(s->flags, state.kind),
                    bsdf.absorption_after(s->flags, state.absorption),
-                   (s->flags & kStraight) != 0 ? state.not_lit_by : bsdf.not_lit_by()},
+                   (s->flags & kStraight) != 0 ? state.not_lit_by : bsdf.not_lit_by(), state.share},
                   (s->flags & kStraight) != 0};
 }
 
@@ -47,21 +47,22 @@ void follow_chains(const Scene& scene, const LightSurfaces& light_surfaces, std:
             chain.origin, chain.direction, rays[i].ray.tfar, [&](const LightSurfaces::Hit& seen) {
               const LightReach& reach = scene.lights()[seen.light].reach;
               if (!reach.lights(chain.state.kind) || !in_set(chain.state.not_lit_by, reach.receivers)) return;
-              hits.add(chain.throughput * seen.radiance, chain.pixel, scene.lights()[seen.light].group);
+              hits.add(chain.throughput * seen.radiance * chain.state.share, chain.pixel,
+                       scene.lights()[seen.light].group);
             });
       if (rays[i].hit.geom == kNoId) {
         if (!scene.environment().reach.lights(chain.state.kind)) continue;
-        const Rgb light = chain.throughput * scene.environment_radiance(chain.direction);
+        const Rgb light = chain.throughput * scene.environment_radiance(chain.direction) * chain.state.share;
         if (max_component(light) > 0.0f) hits.add(light, chain.pixel, scene.environment().group);
         continue;
       }
       const SurfaceInteraction at = scene.interaction(rays[i], chain.pixel);
       chain.throughput *= at.bsdf.transmittance_to(at.t, chain.state.absorption);
-      const Rgb light = chain.throughput * at.emitted;
+      const Rgb light = chain.throughput * at.emitted * chain.state.share;
       if (max_component(light) > 0.0f) hits.add(light, chain.pixel, scene.meshes()[at.mesh].group);
       if (direct) continue;
       for (SurfacePoint point : at.bsdf.layers()) {
-        point.attenuate(chain.throughput);
+        point.attenuate(chain.throughput * chain.state.share);
         if (!PointBsdf(point).black()) hits.found.push_back(point);
       }
       if (auto ray = start_chain(at.bsdf, chain.throughput, chain.pixel, chain.rng, chain.state)) next.push_back(*ray);

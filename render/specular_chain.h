@@ -20,6 +20,7 @@ struct ChainRay {
     uint32_t kind = kCameraRay;  // RayKind
     Rgb absorption{};            // on its way, for each unit of length
     uint32_t not_lit_by = 0;     // sets of receivers that the surface it left is not in
+    float share = 1.0f;          // of what it brings, that counts
   };
   State state;
   bool straight = false;  // it has just gone so
