@@ -239,7 +239,7 @@ class Reader {
     const Texture& all = scene_.textures[static_cast<size_t>(texture(index, TextureUse::vectors, user)) - 1];
     Texture one;
     one.file = all.file, one.width = all.width, one.height = all.height, one.channels = 1;
-    one.flags = all.flags & ~uint32_t{LUMICUT_SRGB};
+    one.flags = all.flags & ~uint32_t{LUMICUT_SRGB | LUMICUT_BLEND_STORED};
     for (size_t i = channel; i < all.bytes.size(); i += all.channels) one.bytes.push_back(all.bytes[i]);
     for (size_t i = channel; i < all.floats.size(); i += all.channels) one.floats.push_back(all.floats[i]);
     scene_.textures.push_back(std::move(one));

@@ -357,6 +357,7 @@ class SceneReader {
         };
         flag("clamp", LUMICUT_CLAMP);
         flag("nearest", LUMICUT_NEAREST);
+        flag("blend_stored", LUMICUT_BLEND_STORED);
         flag("by_view", LUMICUT_BY_VIEW);
         if (auto given = keys.find("by_view"); given && given->boolean() && !by_view)
           given->fail("is for diffuse, specular, translucency, roughness and metallic textures alone");
@@ -411,7 +412,7 @@ class SceneReader {
     }
   }
 
-  // An image that a program looks up: { "file", "use", "clamp", "nearest" }.
+  // An image that a program looks up: { "file", "use", "clamp", "nearest", "blend_stored" }.
   int32_t program_image(const JsonValue& value, const std::string& program) {
     JsonObject keys(value);
     const auto file = keys.need("file");
@@ -420,6 +421,7 @@ class SceneReader {
     uint32_t flags = 0;
     if (keys.boolean("clamp", false)) flags |= LUMICUT_CLAMP;
     if (keys.boolean("nearest", false)) flags |= LUMICUT_NEAREST;
+    if (keys.boolean("blend_stored", false)) flags |= LUMICUT_BLEND_STORED;
     keys.finish();
     return textures_.get(resolve(file), use, flags, fmt::format("program \"{}\" ({})", program, path_));
   }

@@ -263,6 +263,7 @@ class Writer {
     Json out{{"file", file}};
     if ((t.flags & LUMICUT_CLAMP) != 0) out["clamp"] = true;
     if ((t.flags & LUMICUT_NEAREST) != 0) out["nearest"] = true;
+    if ((t.flags & LUMICUT_BLEND_STORED) != 0) out["blend_stored"] = true;
     if ((t.flags & LUMICUT_BY_VIEW) != 0) out["by_view"] = true;
     if (out.size() == 1) return file;
     return out;
@@ -274,6 +275,7 @@ class Writer {
       if (t.floats.empty() && (t.flags & LUMICUT_SRGB) == 0) out["use"] = "numbers";
       if ((t.flags & LUMICUT_CLAMP) != 0) out["clamp"] = true;
       if ((t.flags & LUMICUT_NEAREST) != 0) out["nearest"] = true;
+      if ((t.flags & LUMICUT_BLEND_STORED) != 0) out["blend_stored"] = true;
       return out;
     };
     return {{"name", program_name(texture)},

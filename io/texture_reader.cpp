@@ -62,8 +62,10 @@ Texture read_texture(const std::string& path, std::string_view held, TextureUse 
   };
   if (integers) {
     if (use == TextureUse::colour) texture.flags |= LUMICUT_SRGB;
+    if ((texture.flags & LUMICUT_SRGB) == 0) texture.flags &= ~uint32_t{LUMICUT_BLEND_STORED};
     read(texture.bytes, OIIO::TypeDesc::UINT8);
   } else {
+    texture.flags &= ~uint32_t{LUMICUT_BLEND_STORED};  // floats are linear
     read(texture.floats, OIIO::TypeDesc::FLOAT);
     for (size_t i = 0; i < texture.floats.size(); ++i) {
       const float value = texture.floats[i];

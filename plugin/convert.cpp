@@ -71,16 +71,19 @@ Texture to_texture(const lumicut_texture& in, uint64_t index) {
   c.integer("height", in.height, 1, 65536);
   c.integer("channels", in.channels, 1, 4);
   c.integer("format", in.format, LUMICUT_UINT8, LUMICUT_FLOAT32);
-  c.flags("flags", in.flags, LUMICUT_SRGB | LUMICUT_CLAMP | LUMICUT_NEAREST | LUMICUT_BY_VIEW);
+  c.flags("flags", in.flags, LUMICUT_SRGB | LUMICUT_CLAMP | LUMICUT_NEAREST | LUMICUT_BY_VIEW | LUMICUT_BLEND_STORED);
   const bool by_view = (in.flags & LUMICUT_BY_VIEW) != 0;
   if (by_view && in.width % 2 != 0)
     c.fail("width", number_text(uint64_t{in.width}) + " is not even, as LUMICUT_BY_VIEW needs it");
+  if ((in.flags & LUMICUT_BLEND_STORED) != 0 && (in.flags & LUMICUT_SRGB) == 0)
+    c.fail("flags", "holds LUMICUT_BLEND_STORED without LUMICUT_SRGB");
   if (in.pixels == nullptr) c.fail("pixels", "is NULL");
   Texture::Options options;
   options.srgb = (in.flags & LUMICUT_SRGB) != 0;
   options.by_view = by_view;
   options.clamp = by_view || (in.flags & LUMICUT_CLAMP) != 0;
   options.nearest = (in.flags & LUMICUT_NEAREST) != 0;
+  options.blend_stored = (in.flags & LUMICUT_BLEND_STORED) != 0;
   return {in.width,    in.height,
           in.channels, in.format == LUMICUT_UINT8 ? Texture::Format::uint8 : Texture::Format::float32,
           options,     in.pixels};

@@ -45,12 +45,15 @@ Texture::Texture(TextureProgram program)
       format_(Format::float32),
       program_(std::make_shared<const TextureProgram>(std::move(program))) {}
 
+float Texture::stored(size_t i) const {
+  return format_ == Format::uint8 ? static_cast<float>(bytes_[i]) * (1.0f / 255.0f) : floats_[i];
+}
+
 float Texture::value(uint32_t x, uint32_t y, uint32_t channel) const {
   const size_t i = (size_t{y} * width_ + x) * channels_ + channel;
   const bool alpha = has_alpha() && channel == channels_ - 1;
-  if (format_ == Format::uint8)
-    return options_.srgb && !alpha ? srgb_table()[bytes_[i]] : static_cast<float>(bytes_[i]) * (1.0f / 255.0f);
-  return options_.srgb && !alpha ? srgb_to_linear(floats_[i]) : floats_[i];
+  if (!options_.srgb || alpha) return stored(i);
+  return format_ == Format::uint8 ? srgb_table()[bytes_[i]] : srgb_to_linear(floats_[i]);
 }
 
 Rgb Texture::texel(uint32_t x, uint32_t y) const {
@@ -84,6 +87,13 @@ auto Texture::filter(float u, float v, Fetch fetch) const {
 }
 
 Rgb Texture::color(float u, float v) const {
+  if (options_.blend_stored && !options_.nearest) {
+    const Rgb c = filter(u, v, [&](uint32_t x, uint32_t y) {
+      const size_t i = (size_t{y} * width_ + x) * channels_;
+      return channels_ < 3 ? Rgb{1, 1, 1} * stored(i) : Rgb{stored(i), stored(i + 1), stored(i + 2)};
+    });
+    return {srgb_to_linear(c.x), srgb_to_linear(c.y), srgb_to_linear(c.z)};
+  }
   return filter(u, v, [&](uint32_t x, uint32_t y) { return texel(x, y); });
 }
 

@@ -20,7 +20,8 @@ class Texture {
     bool nearest = false;  // else bilinear
     // Looked up by the view instead of by uv: see by_view(). An even width.
     bool by_view = false;
-    LUMICUT_FIELDS(Options, srgb, clamp, nearest, by_view)
+    bool blend_stored = false;  // with srgb: what is stored is blended, and decoded then
+    LUMICUT_FIELDS(Options, srgb, clamp, nearest, by_view, blend_stored)
   };
 
   // `pixels`: height rows of width texels of `channels` (1..4) values, packed, row 0 on top (v = 1). Copied.
@@ -54,6 +55,7 @@ class Texture {
 
  private:
   float value(uint32_t x, uint32_t y, uint32_t channel) const;
+  float stored(size_t i) const;
   template <typename Fetch>
   auto filter(float u, float v, Fetch fetch) const;
 

@@ -192,7 +192,7 @@ class Writer:
                 image = self.data.images[data - 1]
                 use = "color" if image.pixels.dtype != np.uint8 or image.flags & library.SRGB else "numbers"
                 step["image"] = {"file": self.image(data, "colour" if use == "color" else "vectors"), "use": use,
-                                 **{key: True for key, bit in (("clamp", library.CLAMP), ("nearest", library.NEAREST)) if image.flags & bit}}
+                                 **{key: True for key, bit in (("clamp", library.CLAMP), ("nearest", library.NEAREST), ("blend_stored", library.BLEND_STORED)) if image.flags & bit}}
             steps.append(step)
         return {"name": f"program {number}", "steps": steps}
 
@@ -209,7 +209,8 @@ class Writer:
         if isinstance(self.data.images[number - 1], Program):
             return {"program": f"program {number}"}
         name, flags = self.image(number, use), self.data.images[number - 1].flags
-        options = {key: True for key, bit in (("clamp", library.CLAMP), ("nearest", library.NEAREST), ("by_view", library.BY_VIEW)) if flags & bit}
+        options = {key: True for key, bit in (("clamp", library.CLAMP), ("nearest", library.NEAREST), ("blend_stored", library.BLEND_STORED),
+                                                ("by_view", library.BY_VIEW)) if flags & bit}
         return {"file": name, **options} if options else name
 
     def material(self, name, m):

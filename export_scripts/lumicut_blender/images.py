@@ -26,7 +26,9 @@ class Picture:
     def stored(self):
         if self._stored is not None:
             pixels, srgb = self._stored()
-            return np.ascontiguousarray(pixels), self.flags | (library.SRGB if srgb else 0)
+            # As Cycles blends texels of 8 bits.
+            stored = library.BLEND_STORED if srgb and pixels.dtype == np.uint8 else 0
+            return np.ascontiguousarray(pixels), self.flags | (library.SRGB if srgb else 0) | stored
         return np.ascontiguousarray(self._linear, np.float32), self.flags
 
     def texels(self):

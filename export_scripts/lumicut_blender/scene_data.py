@@ -12,7 +12,7 @@ class Image:
     """Texels as they are stored: (h, w, channels) of uint8 or float32, top row first. A colour has 1 or 3, a mask 1."""
     name: str
     pixels: np.ndarray
-    flags: int = 0  # library.SRGB | CLAMP | NEAREST | BY_VIEW
+    flags: int = 0  # library.SRGB | CLAMP | NEAREST | BY_VIEW | BLEND_STORED
 
 
 @dataclasses.dataclass

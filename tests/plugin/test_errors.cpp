@@ -261,7 +261,9 @@ TEST(Errors, FieldsOfMeshesTexturesCamerasAndEnvironmentsAreCheckedByNameAndValu
   refused_texture([](auto& t) { t.channels = 5; }, LUMICUT_INVALID_ARGUMENT, "lumicut_texture[0].channels: 5");
   refused_texture([](auto& t) { t.format = 2; }, LUMICUT_INVALID_ARGUMENT, "lumicut_texture[0].format: 2");
   refused_texture([](auto& t) { t.pixels = nullptr; }, LUMICUT_INVALID_ARGUMENT, "lumicut_texture[0].pixels: is NULL");
-  refused_texture([](auto& t) { t.flags = 16; }, LUMICUT_UNSUPPORTED, "lumicut_texture[0].flags: 16");
+  refused_texture([](auto& t) { t.flags = 32; }, LUMICUT_UNSUPPORTED, "lumicut_texture[0].flags: 32");
+  refused_texture([](auto& t) { t.flags = LUMICUT_BLEND_STORED; }, LUMICUT_INVALID_ARGUMENT,
+                  "lumicut_texture[0].flags: holds LUMICUT_BLEND_STORED without LUMICUT_SRGB");
   refused_texture([](auto& t) { t.flags = LUMICUT_BY_VIEW, t.width = 1; }, LUMICUT_INVALID_ARGUMENT,
                   "lumicut_texture[0].width: 1 is not even");
 

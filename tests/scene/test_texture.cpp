@@ -24,6 +24,16 @@ TEST(Texture, SrgbIsDecodedInColourAndNotInAlpha) {
   EXPECT_FLOAT_EQ(t.mask(0, 0), 188.0f / 255.0f);
 }
 
+// A quarter of the way from black to white: .25 decoded, and .25 of what white is.
+TEST(Texture, IsDecodedBeforeItIsBlendedOrAfterwards) {
+  const uint8_t p[] = {0, 255};
+  EXPECT_FLOAT_EQ(Texture(2, 1, 1, F::uint8, {.srgb = true, .clamp = true}, p).color(0.375f, 0.5f).x, 0.25f);
+  const Texture stored(2, 1, 1, F::uint8, {.srgb = true, .clamp = true, .blend_stored = true}, p);
+  EXPECT_NEAR(stored.color(0.375f, 0.5f).x, 0.05087608f, 1e-6f);  // ((.25 + .055) / 1.055)^2.4
+  EXPECT_FLOAT_EQ(stored.color(0.9f, 0.5f).y, 1.0f);
+  EXPECT_EQ(stored.average(), (Rgb{0.5f, 0.5f, 0.5f}));
+}
+
 TEST(Texture, RepeatsOverTheEdgeUnlessClamped) {
   const float pixels[] = {0, 1};
   const Texture repeated(2, 1, 1, F::float32, {}, pixels), clamped(2, 1, 1, F::float32, {.clamp = true}, pixels);

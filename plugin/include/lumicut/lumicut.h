@@ -341,7 +341,8 @@ typedef struct lumicut_texture {
   uint32_t width, height;
   uint32_t channels; /* 1..4 */
   uint32_t format;   /* LUMICUT_UINT8 (0..255 -> 0..1) or LUMICUT_FLOAT32 */
-  uint32_t flags;    /* LUMICUT_SRGB: decode; LUMICUT_CLAMP: no repeat; LUMICUT_NEAREST: no filter; LUMICUT_BY_VIEW: below */
+  uint32_t flags;    /* LUMICUT_SRGB: decode; LUMICUT_CLAMP: no repeat; LUMICUT_NEAREST: no filter; LUMICUT_BY_VIEW and
+                        LUMICUT_BLEND_STORED: below */
   const void* pixels; /* row 0 is the top row (v = 1), rows packed */
   const lumicut_program* program; /* computes the value in place of an image; all fields above are 0 then. NULL: an image */
 } lumicut_texture;
@@ -349,8 +350,16 @@ enum { LUMICUT_UINT8 = 0, LUMICUT_FLOAT32 = 1 };
 /* With LUMICUT_BY_VIEW the texture is looked up by how the surface is seen, not by uv: its right half is for the front, from
    edge-on to straight on (u by the cosine to the shading normal, between the centres of that half's first and last texels),
    its left half, mirrored, for the back. The width is even. For Fresnel mixes and the like; not for emission, opacity,
-   normal, height and environment textures */
-enum { LUMICUT_SRGB = 1, LUMICUT_CLAMP = 2, LUMICUT_NEAREST = 4, LUMICUT_BY_VIEW = 8 };
+   normal, height and environment textures.
+   With LUMICUT_BLEND_STORED, which needs LUMICUT_SRGB, texels are blended as they are stored, and the result is decoded, as
+   Cycles does with images of 8 bits: dark lines stay darker. Without it they are decoded first, as glTF asks */
+enum {
+  LUMICUT_SRGB = 1,
+  LUMICUT_CLAMP = 2,
+  LUMICUT_NEAREST = 4,
+  LUMICUT_BY_VIEW = 8,
+  LUMICUT_BLEND_STORED = 16
+};
 
 /* Intensity by direction, as photometric files have it: bilinear between its angles, 0 beyond the vertical ones. */
 typedef struct lumicut_profile {
