@@ -119,7 +119,7 @@ ParamTable params() {
                        "How the lights are clustered: agglomerative makes the smallest cuts, the others are baselines",
                        "", "agglomerative|divisive_3d|divisive_6d"),
       choice<&P::reconstruction>(
-          "reconstruction", "Reconstruction cuts",
+          "reconstruction", "Reconstruction",
           "One point of 4 or of 16 gets a cut of its own; those between take what it knows of visibility where that is "
           "smooth",
           "", "off|4|16"));
