@@ -103,8 +103,8 @@ TEST(Identity, EveryFieldOfAMeshCounts) {
 TEST(Identity, EveryFieldOfATextureCounts) {
   const uint8_t bytes[] = {1, 2};
   const float floats[] = {1, 2};
-  EXPECT_EQ(expect_every_field_counts(Texture(2, 1, 1, Texture::Format::uint8, {}, bytes)), 11u);
-  EXPECT_EQ(expect_every_field_counts(Texture(2, 1, 1, Texture::Format::float32, {}, floats)), 11u);
+  EXPECT_EQ(expect_every_field_counts(Texture(2, 1, 1, Texture::Format::uint8, {}, bytes)), 12u);
+  EXPECT_EQ(expect_every_field_counts(Texture(2, 1, 1, Texture::Format::float32, {}, floats)), 12u);
 }
 TEST(Identity, EveryFieldOfATextureProgramCounts) {
   ProgramInstruction position;
