@@ -4,6 +4,7 @@
 
 #include "bsdf/point_bsdf.h"
 #include "bsdf/straight_glass.h"
+#include "core/even_sequence.h"
 #include "render/traced_gloss.h"
 #include "scene/rng_at_point.h"
 
@@ -113,13 +114,8 @@ void ClampCompensation::trace(const ShadePoints& points, uint32_t level, std::sp
     const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float();
     const uint64_t seed = rays > 1 ? Rng(rng).next_u32() : 0;
     for (uint32_t k = 0; k < rays; ++k) {
-      // Even in the cube for any number. [Roberts 2018: R3]
-      const auto step = [k](float x, double by) {
-        const double at = static_cast<double>(x) + k * by;
-        return static_cast<float>(std::min(at - std::floor(at), 0.99999994));
-      };
-      const auto s = PointBsdf(point).sample(step(choice, 0.8191725133961645), step(u, 0.6710436067037893),
-                                             step(v, 0.5497004779019703));
+      const Vec3f at = even_in_cube(k, {choice, u, v});
+      const auto s = PointBsdf(point).sample(at.x, at.y, at.z);
       if (!s || !is_finite(s->weight)) continue;
       RayHit ray;
       ray.ray.org = point.position, ray.ray.dir = s->direction, ray.ray.mask = ray_kind(s->flags);

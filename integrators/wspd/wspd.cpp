@@ -281,22 +281,29 @@ class Wspd final : public Integrator {
     if (tree_.root() == WspdNode::kNone) return;
     const uint32_t leaf = tree_.near_leaf(blocks.points.position_at(block.first + block.count / 2));
     const auto add = [&](uint32_t v) {
-      work.stack.assign(1, v);
-      while (!work.stack.empty()) {
-        const uint32_t top = work.stack.back();
-        work.stack.pop_back();
-        const WspdNode& n = tree_.node(top);
-        ++tests;
-        if (behind(block, n)) continue;
-        if (n.leaf() || well_separated(block.box, n, point_separation_))
-          estimate(blocks, b, top, work);
-        else
-          for (uint32_t c = 0; c < n.child_count; ++c) work.stack.push_back(n.first_child + c);
-      }
+      split(blocks, b, v, work, tests,
+            [&](const WspdNode& n) { return well_separated(block.box, n, point_separation_); });
     };
     add(leaf);
     for (uint32_t w = leaf; w != WspdNode::kNone && !progress.cancelled(); w = tree_.node(w).parent)
       for (const uint32_t v : tree_.pairs(w)) add(v);
+  }
+
+  // Takes the cluster `v` where `stays`, else what it is split into; leaves stay.
+  template <typename Stays>
+  void split(const Blocks& blocks, size_t b, uint32_t v, Workspace& work, uint32_t& tests, const Stays& stays) const {
+    work.stack.assign(1, v);
+    while (!work.stack.empty()) {
+      const uint32_t top = work.stack.back();
+      work.stack.pop_back();
+      const WspdNode& n = tree_.node(top);
+      ++tests;
+      if (behind(blocks.blocks[b], n)) continue;
+      if (n.leaf() || stays(n))
+        estimate(blocks, b, top, work);
+      else
+        for (uint32_t c = 0; c < n.child_count; ++c) work.stack.push_back(n.first_child + c);
+    }
   }
 
   // Alg. 2 as printed, for a block of one point: clusters that are further from the light than d / ε stay, others are
@@ -319,22 +326,12 @@ class Wspd final : public Integrator {
       for (const uint32_t v : tree_.pairs(w)) received += given(tree_.node(v));
     estimate(blocks, b, leaf, work);
     for (uint32_t w = leaf; w != WspdNode::kNone && !progress.cancelled(); w = tree_.node(w).parent)
-      for (const uint32_t v : tree_.pairs(w)) {
-        work.stack.assign(1, v);
-        while (!work.stack.empty()) {
-          const uint32_t top = work.stack.back();
-          work.stack.pop_back();
-          const WspdNode& n = tree_.node(top);
-          ++tests;
-          if (behind(block, n)) continue;
+      for (const uint32_t v : tree_.pairs(w))
+        split(blocks, b, v, work, tests, [&](const WspdNode& n) {
           const bool apart =
               length(light - n.center) - n.radius >= limit || well_separated(block.box, n, point_separation_);
-          if (n.leaf() || (apart && given(n) <= bright_ * received))
-            estimate(blocks, b, top, work);
-          else
-            for (uint32_t c = 0; c < n.child_count; ++c) work.stack.push_back(n.first_child + c);
-        }
-      }
+          return apart && given(n) <= bright_ * received;
+        });
   }
 
   // What the cluster gives to the block's samples; it joins the clustering unless that is certainly nothing.
