@@ -69,14 +69,7 @@ std::unique_ptr<Scene> make_lamp_in_metal() {
   Light lamp;
   lamp.type = LightType::point, lamp.position = {0, 0, 0.1f}, lamp.radius = 0.03f, lamp.value = {1, 1, 1};
   scene->set_lights({lamp});
-  Camera camera;
-  camera.position = {0, -0.9f, 0.2f};
-  camera.right = {1, 0, 0}, camera.forward = normalize(Vec3f{0, 1, -0.9f});
-  camera.up = normalize(cross(camera.right, camera.forward));
-  camera.tan_half_fov_y = 0.5f;
-  scene->set_camera(camera);
-  Progress progress;
-  scene->commit(progress);
+  test::commit_seen_from(*scene, {0, -0.9f, 0.2f}, 0.5f, {0, 1, -0.9f});
   return scene;
 }
 

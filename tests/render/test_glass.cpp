@@ -86,14 +86,7 @@ std::unique_ptr<Scene> make_glass(Glass kind) {
       add_ball(mesh, {0, 0.1f, 0}, 0.6f, 1);
   }
   scene->add_mesh(std::move(mesh));
-  Camera camera;
-  camera.position = {0, -0.95f, 0.2f};
-  camera.right = {1, 0, 0}, camera.forward = normalize(Vec3f{0.3f, 1, -0.5f});
-  camera.up = normalize(cross(camera.right, camera.forward));
-  camera.tan_half_fov_y = 0.8f;
-  scene->set_camera(camera);
-  Progress progress;
-  scene->commit(progress);
+  test::commit_seen_from(*scene, {0, -0.95f, 0.2f}, 0.8f, {0.3f, 1, -0.5f});
   return scene;
 }
 

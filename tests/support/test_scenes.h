@@ -56,11 +56,12 @@ inline void commit_quad(Scene& scene, const Material& material, Vec3f a, Vec3f b
   scene.commit(progress);
 }
 
-// Commits the scene with a camera that looks along y.
-inline void commit_seen_from(Scene& scene, Vec3f position, float tan_half_fov_y) {
+// Commits the scene with a camera whose right is x, and which looks along y unless told otherwise.
+inline void commit_seen_from(Scene& scene, Vec3f position, float tan_half_fov_y, const Vec3f& towards = {0, 1, 0}) {
   Camera camera;
   camera.position = position;
-  camera.right = {1, 0, 0}, camera.forward = {0, 1, 0}, camera.up = {0, 0, 1};
+  camera.right = {1, 0, 0}, camera.forward = normalize(towards);
+  camera.up = normalize(cross(camera.right, camera.forward));
   camera.tan_half_fov_y = tan_half_fov_y;
   scene.set_camera(camera);
   Progress progress;
