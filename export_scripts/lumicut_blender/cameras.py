@@ -136,6 +136,23 @@ def convert_camera(camera, scene, report, matrix=None, shift_x=None):
     return out
 
 
+def on_film(camera, width, height, places):
+    """Where a library.Camera of an image of width x height pixels sees places (n, 3): pixels to the right and up from a place
+    of its own. None for fisheyes."""
+    axes = np.array(camera.to_world[:], np.float64).reshape(3, 4)
+    x, y, z = ((places - axes[:, 3]) @ axes[:, :3]).T
+    if camera.panorama == library.EQUIRECTANGULAR:
+        span = [ends[1] - ends[0] for ends in (camera.longitude, camera.latitude)]
+        return np.stack([np.arctan2(x, -z) / span[0] * width,
+                         np.arctan2(y, np.hypot(x, z)) / span[1] * height], -1)
+    if camera.panorama:
+        return None
+    heights = np.full_like(z, camera.height) if camera.orthographic else -2 * z * math.tan(camera.fov_y / 2)
+    heights = np.where(np.abs(heights) > 1e-9, heights, 1e-9)
+    shift = np.array(camera.shift[:])
+    return (np.stack([x, y], -1) / heights[:, None] - shift) * height / (camera.pixel_aspect or 1, 1)
+
+
 def viewport_camera(context, width, height):
     """A library.Camera of a 3D view of width x height pixels."""
     region, space = context.region_data, context.space_data

@@ -332,7 +332,7 @@ class Collector:
         for name, sun in suns:
             sun.group = self._group(world)
             self.scene.lights.append((name, sun))
-        self.scene.lamps = len(self.scene.lights)
+        self.scene.lamps, self.scene.world_suns = len(self.scene.lights), len(suns)
         if self.scene.environment is not None:
             self.scene.environment.group = self._group(world)
         self.scene.transparent = scene.render.film_transparent

@@ -16,6 +16,7 @@ LONG_PASS_NAMES = {"IndexOB": "Object Index", "IndexMA": "Material Index", "Emit
                    "AO": "Ambient Occlusion"}
 LONG_PASS_NAMES |= {short + what: f"{long} {means}" for short, long in (("Diff", "Diffuse"), ("Gloss", "Glossy"), ("Trans", "Transmission"))
                     for what, means in (("Dir", "Direct"), ("Ind", "Indirect"), ("Col", "Color"))}
+LONG_PASS_NAMES |= {"VolumeDir": "Volume Direct", "VolumeInd": "Volume Indirect"}
 
 
 def pass_name(short):

@@ -7,7 +7,7 @@ import traceback
 
 import bpy
 
-from . import cameras, collect, export, passes, properties, runtime, shadow_catcher, sky, viewport
+from . import cameras, collect, export, motion, passes, properties, runtime, shadow_catcher, sky, viewport
 from .lumicut import library
 from .report import WRONG, Report
 
@@ -109,10 +109,13 @@ class LumicutEngine(bpy.types.RenderEngine):
         report = self._report_of(scene.frame_current)
         layer = depsgraph.view_layer_eval
         hits = not self.is_preview and passes.wants_hits(layer)
-        data = collect.Collector(depsgraph, report, self._check, max_shininess=settings.max_shininess,
-                                 bake=None if self.is_preview else sky.bake, hits=hits,
-                                 uv_maps=hits and layer.use_pass_uv).collect()
+        collector = collect.Collector(depsgraph, report, self._check, max_shininess=settings.max_shininess,
+                                      bake=None if self.is_preview else sky.bake, hits=hits,
+                                      uv_maps=hits and layer.use_pass_uv)
+        data = collector.collect()
         views = cameras.views_of(self, scene, report)
+        motions = motion.collect(self, depsgraph, data, views, collector.materials.images, report, self._check) \
+            if hits and layer.use_pass_vector and not export_requests else None
         data.camera = views[0][1]
         collected = time.perf_counter() - started
         width, height = self.resolution_x, self.resolution_y
@@ -159,7 +162,7 @@ class LumicutEngine(bpy.types.RenderEngine):
                 for part, beside in catching.values():
                     part.upload(beside, self._check)
                 catching = {name: beside for name, (_, beside) in catching.items()}
-            of_hits = passes.hit_passes_of(data, layer) if hits else None
+            of_hits = passes.hit_passes_of(data, layer, motions) if hits else None
             seen = {} if self.is_preview else passes.scenes_beside(data, layer, lambda aov: collect.Collector(
                 depsgraph, None, self._check, max_shininess=settings.max_shininess, aov=aov).collect())
             frames = {name: (part, library.Scene(device, **tracing)) for name, part in seen.items()}
@@ -169,7 +172,7 @@ class LumicutEngine(bpy.types.RenderEngine):
             data = part = None  # the library has its own copy now
             for name, value in parameters.items():
                 integrator.set(name, value)
-            for self._view in views:
+            for view, self._view in enumerate(views):
                 target.set_camera(self._view[1])
                 watched.run(target, "acceleration structure", target.commit)
                 self._check()
@@ -179,10 +182,19 @@ class LumicutEngine(bpy.types.RenderEngine):
                     self._caught = {name: self._frame_beside(watched, name, beside, integrator_name, parameters, samples,
                                                              finished.passes_done, width, height, crop)
                                     for name, beside in catching.items()}
+                    of_lamps = {}
                     for name, beside in frames.items():
+                        if name in {passes.SHADOWED, passes.UNSHADOWED}:
+                            own = properties.tables.has(integrator_name, library.LIGHT_GROUPS)
+                            plain = {k: v for k, v in parameters.items() if k in {"vpls", "seed"}} if own else {"vpls": "3000"}
+                            of_lamps[name] = self._frame_beside(watched, name, beside, integrator_name if own else "lightcuts", plain,
+                                                                samples, finished.passes_done, width, height, crop, groups=True)
+                            continue
                         frame = self._frame_beside(watched, name, beside, integrator_name, parameters, samples,
                                                    finished.passes_done, width, height, crop)
                         self._passes[name] = passes.of_frame(name, layer, frame, passes.exposure(scene))
+                    if of_lamps:
+                        self._passes[passes.BESIDE["use_pass_shadow"][0]] = passes.of_shadows(of_lamps)
                     if not self.is_preview:
                         self._passes |= passes.of_lobes(layer, scene, lambda name, **more: self._frame_beside(
                             watched, name, target, integrator_name, parameters, samples, finished.passes_done, width, height, crop,
@@ -193,7 +205,7 @@ class LumicutEngine(bpy.types.RenderEngine):
                                                    filter=self._options["pixel_filter"], filter_width=self._options["filter_width"])
                         frame.crop[:] = crop
                         seed = int(integrator.get("seed"))
-                        self._passes |= of_hits.trace(target, frame, seed, finished.passes_done, self._check)
+                        self._passes |= of_hits.trace(target, frame, seed, finished.passes_done, self._check, view)
                         for field, text in of_hits.metadata(layer.name).items():
                             self.get_result().stamp_data_add_field(field, text)
                     self._write(render, depsgraph, self._chosen, crop, crop, height)
@@ -254,13 +266,13 @@ class LumicutEngine(bpy.types.RenderEngine):
         return self._notes[1]
 
     def _frame_beside(self, watched, name, scene, integrator_name, parameters, samples, passes_done, width, height, crop,
-                      flags=0, **more):
-        """{channel: pixels} of another scene, rendered as the whole one was [shadow_catcher.py]; or of the same one, with
-        `more` of what lumicut_render_desc has."""
+                      flags=0, groups=False, **more):
+        """{channel: pixels} of another scene, rendered as the whole one was [shadow_catcher.py], or of the direct light of each
+        of its `groups`; or of the same one, with `more` of what lumicut_render_desc has."""
         if not flags and not more:
             scene.set_camera(self._view[1])
             watched.run(scene, "acceleration structure", scene.commit)
-            flags = self._options["flags"] & (library.DENOISE | library.KEEP_FIREFLIES)
+            flags = library.DIRECT | library.GROUPS if groups else self._options["flags"] & (library.DENOISE | library.KEEP_FIREFLIES)
         if more.get("occlusion"):  # by no light
             parameters = parameters | {name: "1" for name in ("vpls", "samples") if name in parameters}
         with library.Integrator(scene.device, integrator_name) as integrator:
@@ -269,8 +281,9 @@ class LumicutEngine(bpy.types.RenderEngine):
             with library.Render(integrator, scene, width, height, samples, crop, self._tile_size(crop), passes=max(1, passes_done),
                                 flags=flags, **{name: self._options[name] for name in ("pixel_filter", "filter_width")}, **more) as render:
                 self._poll(render, f"beside: {name}", lambda: None)
-                return {channel: render.read(channel)
-                        for channel in ("radiance", "alpha", *(["denoised"] if flags & library.DENOISE else []), *(["albedo"] if more else []))}
+                channels = ["radiance", "alpha", *(f"radiance.{group}" for group in render.groups())]
+                channels += (["denoised"] if flags & library.DENOISE else []) + (["albedo"] if more or groups else [])
+                return {channel: render.read(channel) for channel in channels}
 
     def _follow(self, render, depsgraph, crop, height, groups, show_tiles):
         """Polls until the frame is done; hands tiles over as they finish. The library's last status."""

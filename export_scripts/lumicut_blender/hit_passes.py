@@ -8,6 +8,7 @@ import json
 
 import numpy as np
 
+from . import motion, scene_data
 from .lumicut import library
 
 MOST_PASSES = 64  # of a render, whose samples are looked at: coverage is known to a percent or two by then
@@ -60,11 +61,20 @@ class Ids:
         return json.dumps({name: f"{id_of(name):08x}" for name in self.numbers}, separators=(",", ":"), ensure_ascii=False)
 
 
+def uv_map_of_hits(mesh):
+    """As the library has the corners: a mirrored mesh that stands alone is turned over [scene_data.baked]."""
+    if mesh.uv_map is not None and len(mesh.transforms) == 1 and scene_data.is_mirrored(mesh.transforms[0]):
+        return mesh.uv_map[:, [0, 2, 1]]
+    return mesh.uv_map
+
+
 class HitPasses:
     """Made from collected data that knows its objects. `kinds`: of CRYPTOMATTES; `levels`: how many a pixel has;
-    `indices`: names of the passes of objects and materials; `uvs`: whether there is one of texture coordinates."""
+    `indices`: names of the passes of objects and materials; `uvs`: whether there is one of texture coordinates; `motions`:
+    a motion.Motion, or None."""
 
-    def __init__(self, data, kinds, levels, indices, uvs):
+    def __init__(self, data, kinds, levels, indices, uvs, motions=None):
+        self.motions = motions
         self.kinds, self.levels, self.indices, self.uvs = kinds, levels, indices, uvs
         self.ids = {kind: Ids() for kind in kinds}
         self._first = np.cumsum([0] + [len(mesh.transforms) for mesh in data.meshes])
@@ -74,7 +84,7 @@ class HitPasses:
         of = {"object": [o.name for o in owners], "asset": [o.asset for o in owners],
               "material": [name or "default_surface" for name, _ in data.material_names]}
         self._numbers = {kind: np.array([self.ids[kind].number(name) for name in of[kind]] or [0], np.int64) for kind in kinds}
-        self._uv_maps = [mesh.uv_map for mesh in data.meshes] if uvs else None
+        self._uv_maps = [uv_map_of_hits(mesh) for mesh in data.meshes] if uvs else None
 
     def metadata(self, layer):
         """{field: text} of the image."""
@@ -86,8 +96,8 @@ class HitPasses:
                     f"{prefix}/manifest": ids.manifest()}
         return out
 
-    def trace(self, scene, frame, seed, passes_done, check):
-        """{pass: (h, w, channels)} of the frame's crop. `frame`: a library.RenderDesc; `check` raises to stop."""
+    def trace(self, scene, frame, seed, passes_done, check, view=0):
+        """{pass: (h, w, channels)} of the frame's crop. `frame`: a library.RenderDesc; `check` raises to stop; `view`: its number."""
         x0, y0, x1, y1 = frame.crop[:]
         width, samples, passes = x1 - x0, max(1, frame.samples), max(1, min(passes_done, MOST_PASSES))
         rows = max(1, BAND // (width * samples * passes))
@@ -96,7 +106,10 @@ class HitPasses:
             check()
             rect = (x0, top, x1, min(y1, top + rows))
             hits = np.stack([scene.first_hits(frame, seed, number, rect) for number in range(passes)], 1)
-            bands.append(self._of_band(hits.reshape(-1, passes * samples), rect[3] - top, width))
+            hits = hits.reshape(-1, passes * samples)
+            bands.append(self._of_band(hits, rect[3] - top, width))
+            if self.motions is not None:
+                bands[-1][motion.PASS] = self.motions.of_hits(hits, view, frame.width, frame.height).reshape(rect[3] - top, width, 4)
         return {name: np.concatenate([band[name] for band in bands]) for name in bands[0]} if bands else {}
 
     def _of_band(self, hits, height, width):

@@ -4,16 +4,13 @@ import dataclasses
 
 import numpy as np
 
-from . import compat, hit_passes, properties, shadow_catcher
+from . import compat, hit_passes, motion, properties, shadow_catcher
 from .lumicut import library
 
 NO_DEPTH = 1e10  # as Cycles has it where nothing is hit
 
 # Properties of view layers, and of what Cycles adds to them, for passes that are not there: shown by their names.
-LEFT_OUT = {
-    "use_pass_vector": "Vector", "use_pass_shadow": "Shadow", "use_pass_volume_direct": "Volume Direct",
-    "use_pass_volume_indirect": "Volume Indirect",
-}
+LEFT_OUT = {"pass_debug_sample_count": "Debug Sample Count"}
 
 
 # Passes that no channel of the frame has, by the property of a view layer: made of its hits, or of frames beside it.
@@ -24,12 +21,17 @@ BESIDE = {
     "use_pass_emit": (compat.pass_name("Emit"), "RGB", "COLOR", "frame"),
     "use_pass_environment": (compat.pass_name("Env"), "RGB", "COLOR", "frame"),
     "use_pass_ambient_occlusion": (compat.pass_name("AO"), "RGB", "COLOR", "frame"),
+    "use_pass_vector": (motion.PASS, "XYZW", "VECTOR", "hits"),
+    "use_pass_shadow": ("Shadow", "RGB", "COLOR", "frame"),
 }
 # What kinds of lobes show, apart: their light over their colour, and that colour.
 LOBES = {"diffuse": ("Diff", library.DIFFUSE_RAYS), "glossy": ("Gloss", library.GLOSSY_RAYS),
          "transmission": ("Trans", library.TRANSMISSION_RAYS)}
 BESIDE |= {f"use_pass_{lobe}_{what}": (compat.pass_name(short + what[:3].capitalize()), "RGB", "COLOR", "frame")
            for lobe, (short, _) in LOBES.items() for what in ("direct", "indirect", "color")}
+# No volume is rendered, and where there are some they are listed: a compositor that adds these up has the rest.
+VOLUMES = {f"use_pass_volume_{what}": (compat.pass_name("Volume" + what[:3].capitalize()), "RGB", "COLOR", "black")
+           for what in ("direct", "indirect")}
 
 
 def write_pass(render_pass, pixels):
@@ -69,6 +71,7 @@ def wanted(layer):
     for prop, row in BESIDE.items():
         if getattr(layer, prop, False):
             chosen.append(row)
+    chosen += [row for prop, row in VOLUMES.items() if getattr(layer, prop, False) or of_cycles(layer, prop, False)]
     chosen += [(f"{hit_passes.CRYPTOMATTES[kind]}{i:02d}", "rgba", "COLOR", "hits") for kind in cryptomattes(layer)
                for i in range((layer.pass_cryptomatte_depth + 1) // 2)]
     chosen += [(aov.name, "RGBA" if aov.type == "COLOR" else "X", aov.type, "frame") for aov in aovs(layer)]
@@ -83,11 +86,11 @@ def wanted(layer):
     return chosen
 
 
-def hit_passes_of(data, layer):
+def hit_passes_of(data, layer, motions=None):
     names = {row[0] for row in wanted(layer)}
     rows = [BESIDE[f"use_pass_{what}_index"][0] for what in ("object", "material")]
     return hit_passes.HitPasses(data, cryptomattes(layer), layer.pass_cryptomatte_depth,
-                                rows if names & set(rows) else None, layer.use_pass_uv)
+                                rows if names & set(rows) else None, layer.use_pass_uv, motions)
 
 
 def scenes_beside(data, layer, collect_aov):
@@ -101,7 +104,40 @@ def scenes_beside(data, layer, collect_aov):
     if layer.use_pass_environment:
         holes = [(name, _as_hole(values)) for name, values in data.materials]
         out[BESIDE["use_pass_environment"][0]] = dataclasses.replace(data, lights=[], materials=holes)
+    if layer.use_pass_shadow:
+        out |= shadow_scenes(data)
     return out
+
+
+def shadow_scenes(data):
+    """{name: scene}: white surfaces under the objects' lamps, each in a light group of its own, with and without shadows."""
+    lamps = [(name, library.Light.from_buffer_copy(light)) for name, light in data.lights[:len(data.lights) - data.world_suns]
+             if light.value > 0 and any(light.color)]
+    numbers = {}
+    for name, light in lamps:  # a lamp may be several lights
+        light.group = 1 + numbers.setdefault(name, len(numbers)) % 255
+        light.color[:] = [1.0] * 3
+    alike = dataclasses.replace(data, environment=None, materials=[(name, _as_white(values)) for name, values in data.materials])
+    free = [(name, library.Light.from_buffer_copy(light)) for name, light in lamps]
+    for _, light in free:
+        light.flags |= library.NO_SHADOWS
+    return {SHADOWED: dataclasses.replace(alike, lights=lamps), UNSHADOWED: dataclasses.replace(alike, lights=free)}
+
+
+SHADOWED, UNSHADOWED = "lamps with shadows", "lamps without shadows"
+
+
+def of_shadows(frames):
+    """The pass Shadow, as Cycles has it: of each lamp the share that nothing stands before, in the mean of the lamps; 0 for
+    those that a surface does not face. `frames`: of shadow_scenes, {channel: pixels}."""
+    with_shadows, without = frames[SHADOWED], frames[UNSHADOWED]
+    groups = [channel for channel in without if channel.startswith("radiance.")]
+    total = np.zeros_like(without["radiance"])
+    for group in groups:
+        lit = without[group]
+        known = lit > 0
+        total += np.where(known, with_shadows.get(group, np.zeros_like(lit)) / np.where(known, lit, 1), 0)
+    return np.clip(total / max(1, len(groups)), 0, 1) * np.clip(without["albedo"], 0, 1)  # which is how much of a pixel is white
 
 
 def of_lobes(layer, scene, frame, factor):
@@ -141,6 +177,18 @@ def _only_emission(values):
         getattr(out, slot)[:] = [0.0] * 3
     out.metallic = out.transmission = out.coat = 0.0
     for slot in ("diffuse", "specular", "translucency", "metallic", "roughness", "normal", "height"):
+        setattr(out, slot + "_texture", 0)
+    return out
+
+
+def _as_white(values):
+    """Of what reflects light by itself; glass lets it pass as it does."""
+    out = library.Material.from_buffer_copy(values)
+    reflects = any((*values.diffuse, *values.specular, *values.translucency)) or values.metallic > 0
+    for slot in ("diffuse", "specular", "translucency", "emission"):
+        getattr(out, slot)[:] = [float(reflects and slot == "diffuse")] * 3
+    out.metallic = out.coat = 0.0
+    for slot in ("diffuse", "specular", "translucency", "metallic", "roughness", "emission"):
         setattr(out, slot + "_texture", 0)
     return out
 
@@ -247,6 +295,9 @@ class Filler:
         if channel in self._with_backdrop:
             pixels = pixels + (1 - self.channel("alpha")) * self._backdrop(self.camera, self.tile).astype(np.float32)
         return pixels if self._exposure == 1 else pixels * np.float32(self._exposure)
+
+    def black(self):
+        return np.zeros((*self.hit.shape[:2], 3), np.float32)
 
     def combined(self):
         return self._image("denoised" if self._denoised else "radiance") if not self._caught else self._with_caught_shadows()

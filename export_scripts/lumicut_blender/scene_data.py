@@ -69,6 +69,11 @@ class Profile:
     values: np.ndarray      # (horizontal, vertical), W/sr
 
 
+def is_mirrored(transform):
+    m = np.array(transform, np.float32).astype(np.float64).reshape(3, 4)
+    return np.cross(m[:, 0], m[:, 1]) @ m[:, 2] < 0
+
+
 def baked(mesh, check=lambda: None):
     """(positions, normals, indices) of a mesh with one instance, in the world: no tree of trees for what stands alone.
 
@@ -123,6 +128,7 @@ class SceneData:
     profiles: list = dataclasses.field(default_factory=list)   # of lights' 1-based numbers
     lights: list = dataclasses.field(default_factory=list)     # (name, library.Light)
     lamps: int = 0                                             # that these come from
+    world_suns: int = 0                                        # the last of lights: of the world
     environment: library.Environment | None = None
     backdrop: object = None  # worlds.Backdrop that the camera sees in place of the environment
     transparent: bool = False  # whether the film is

@@ -96,7 +96,7 @@ class BesideCycles(unittest.TestCase):
         m = h.material("mixed")
         mix, gloss, tree = h.shader(m, "ShaderNodeMixShader"), m.node_tree.nodes.new("ShaderNodeBsdfGlossy"), m.node_tree
         diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
-        mix.inputs[0].default_value, gloss.inputs["Roughness"].default_value = 0.4, 0.5
+        mix.inputs[0].default_value, gloss.inputs["Roughness"].default_value, gloss.distribution = 0.4, 0.5, "GGX"
         diffuse.inputs["Color"].default_value, gloss.inputs["Color"].default_value = (0.7, 0.3, 0.2, 1), (0.6, 0.7, 0.8, 1)
         tree.links.new(diffuse.outputs[0], mix.inputs[1])
         tree.links.new(gloss.outputs[0], mix.inputs[2])
@@ -127,6 +127,93 @@ class BesideCycles(unittest.TestCase):
             ours, theirs = self.render_both()
             np.testing.assert_allclose(h.blocks(ours["AO"]), h.blocks(theirs["AO"]), atol=0.04)
             np.testing.assert_allclose(ours["AO"].mean(), theirs["AO"].mean(), rtol=0.01)
+
+    def move(self, ob, frames, **places):
+        """Keys of properties, a value each frame."""
+        for name, values in places.items():
+            for frame, value in zip(frames, values):
+                setattr(ob, name, value)
+                ob.keyframe_insert(name, frame=frame)
+
+    def compare_vectors(self, most=0.03):
+        self.layer.use_pass_vector = True
+        self.scene.frame_set(1)
+        ours, theirs = self.render_both()
+        a, b = ours["Vector"], theirs["Vector"]
+        self.assertGreater(np.abs(b).max(), 1)
+        inside = np.abs(b - np.roll(b, 1, 0)).max(-1) + np.abs(b - np.roll(b, 1, 1)).max(-1) < 0.8
+        self.assertGreater(inside.mean(), 0.4)
+        # In pixels; outlines are of other samples.
+        self.assertLess(np.quantile(np.abs(a - b)[inside].max(-1), 0.95), most)
+        np.testing.assert_allclose(h.blocks(a), h.blocks(b), atol=0.25)
+        self.assertEqual(self.scene.frame_current, 1)
+
+    def test_vectors_of_objects_that_move(self):
+        self.move(self.ball, (0, 1, 2), location=[(0, 0.3, 0.8), (0.3, 0.2, 0.8), (0.6, 0.3, 0.9)])
+        self.ground.scale.x = -1  # a mirrored mesh that stands alone
+        self.move(self.ground, (0, 1, 2), rotation_euler=[(0, 0, -0.1), (0, 0, 0), (0, 0, 0.2)])
+        self.compare_vectors()
+
+    def test_vectors_of_a_camera_that_moves_and_of_vertices(self):
+        camera = self.scene.camera
+        self.move(camera, (1, 2), location=[camera.location.copy(), camera.location + camera.location * 0.1])
+        self.move(camera, (1, 2), rotation_euler=[(0.1, 0, 0), (0.15, 0.02, 0.1)])
+        self.ground.shape_key_add(name="Basis")
+        key = self.ground.shape_key_add(name="bent")
+        for point in key.data:
+            point.co.z += 0.5 * point.co.x
+        self.move(key, (0, 1, 2), value=[0, 0.5, 1])
+        # Cycles of 4.3 gives vectors to what stands still before an orthographic camera that does.
+        for kind in ("PERSP", "ORTHO") if h.VERSION < (4, 0, 0) else ("PERSP",):
+            with self.subTest(kind):
+                camera.data.type, camera.data.ortho_scale = kind, 4
+                self.compare_vectors()
+
+    def test_vectors_of_instances_follow_their_own(self):
+        parent = h.add_mesh("Parent", [(-0.8, -0.5, 0.5), (0.8, -0.5, 0.5), (0, 0.8, 0.5)], [(0, 1, 2)])
+        parent.instance_type, parent.show_instancer_for_render = "VERTS", False
+        self.ball.parent, self.ball.location = parent, (0, 0, 0)
+        self.ball.scale = (0.6,) * 3
+        self.move(parent, (0, 1, 2), rotation_euler=[(0, 0, -0.3), (0, 0, 0), (0, 0, 0.4)])
+        self.compare_vectors()
+
+    def test_vectors_of_a_panorama(self):
+        camera = self.scene.camera
+        camera.data.type = "PANO"
+        own = camera.data if hasattr(camera.data, "panorama_type") else camera.data.cycles
+        own.panorama_type = "EQUIRECTANGULAR"
+        camera.location, camera.rotation_euler = (0.3, -0.4, 1.5), (1.5, 0, 0.2)
+        self.move(camera, (1, 2), location=[camera.location.copy(), (0.4, -0.2, 1.6)])
+        self.compare_vectors()
+
+    @unittest.skipIf(h.VERSION >= (4, 0, 0), "Cycles has no such pass")
+    def test_shadows_of_lamps(self):
+        self.layer.use_pass_shadow = True
+        self.scene.render.resolution_x, self.scene.render.resolution_y = 96, 72
+        h.add_light("POINT", (1, 1, 2), 100, shadow_soft_size=0.2)
+        h.add_light("SPOT", (-1, 0.5, 3), 300, shadow_soft_size=0.1, spot_size=0.7)
+        sky = h.add_light("AREA", (0, 0, 4), 200, size=0.5)
+        sky.data.color = (1, 0.5, 0.2)
+        h.add_sphere(0.2, (-0.6, 0.4, 0.5), h.emission(2), name="Lamp")
+        ours, theirs = self.render_both(512)
+        a, b = h.blocks(ours["Shadow"], 12), h.blocks(theirs["Shadow"], 12)
+        self.assertLess(b.min(), 0.5)
+        np.testing.assert_allclose(a, b, atol=0.08)  # where a part of a lamp's cone reaches, that part counts alone
+        np.testing.assert_allclose(a.mean(), b.mean(), rtol=0.02)
+
+    def test_volumes_are_black_where_a_compositor_adds_them_up(self):
+        for what in ("direct", "indirect"):
+            setattr(self.layer.cycles, f"use_pass_volume_{what}", True)
+        ours, theirs = self.render_both(16)
+        for name in ("VolumeDir", "VolumeInd"):
+            self.assertEqual(ours[name].shape, theirs[name].shape)
+            self.assertEqual(np.abs(ours[name]).max(), 0)
+
+    def test_texture_coordinates_of_mirrored_meshes(self):
+        self.layer.use_pass_uv = True
+        self.ground.scale.x = -1
+        ours, theirs = self.render_both()
+        np.testing.assert_allclose(h.blocks(ours["UV"]), h.blocks(theirs["UV"]), atol=0.02)
 
     def test_aovs_of_constants_images_and_programs(self):
         for name, kind in (("tint", "COLOR"), ("worn", "VALUE")):

@@ -646,6 +646,12 @@ for prop, label in (("use_pass_z", "Depth"), ("use_pass_mist", "Mist"), ("use_pa
         setattr(bpy.context.view_layer, prop, True)
 
 
+for prop, label in (("use_pass_volume_direct", "Volume Direct"), ("use_pass_volume_indirect", "Volume Indirect")):
+    @feature("Passes", label)
+    def _(test, prop=prop):
+        setattr(bpy.context.view_layer.cycles, prop, True)
+
+
 @feature("Passes", "AOV")
 def _(test):
     bpy.context.view_layer.aovs.add().name = "Mine"
