@@ -7,7 +7,6 @@
 #include <filesystem>
 
 #include "io/file_error.h"
-#include "io/find_beside.h"
 #include "io/scene_defaults.h"
 #include "io/scene_model.h"
 
@@ -215,6 +214,24 @@ std::optional<Vec> constant_of(const PaintRef& paint) {
 
 // ---- The scene
 
+namespace {
+Vec mean_of_texels(const Texture& t) {
+  const size_t texels = size_t{t.width} * t.height, n = t.channels;
+  Vec sum{0, 0, 0};
+  if (texels == 0) return {0.5, 0.5, 0.5};
+  for (size_t i = 0; i < texels * n; ++i) {
+    double x = t.bytes.empty() ? double{t.floats[i]} : t.bytes[i] / 255.0;
+    if (!t.bytes.empty() && (t.flags & LUMICUT_SRGB) != 0)
+      x = x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4);
+    if (n == 1)
+      sum = sum + Vec{x, x, x};
+    else if (i % n < 3)
+      sum[i % n] += x;
+  }
+  return sum * (1 / double(texels));
+}
+}  // namespace
+
 void SceneBuilder::fail(const std::string& where, const std::string& text) const {
   throw FileError(path_, where.empty() ? text : fmt::format("{}: {}", where, text));
 }
@@ -250,8 +267,14 @@ PaintRef SceneBuilder::mixed(const PaintRef& a, const PaintRef& b, const PaintRe
   return made(out);
 }
 
+FoundFile SceneBuilder::find(const std::string& name) const {
+  FoundFile file = find_beside(path_, name);
+  for (size_t i = 0; i < folders_.size() && file.path.empty(); ++i) file = find_beside(folders_[i] + "/", name);
+  return file;
+}
+
 int32_t SceneBuilder::image(const std::string& name, TextureUse use, uint32_t flags) {
-  const FoundFile file = find_beside(path_, name);
+  const FoundFile file = find(name);
   if (file.path.empty()) {
     scene.warnings.add("missing textures", path_,
                        fmt::format("the texture {} does not exist; grey stands in", shown(name)));
@@ -261,6 +284,40 @@ int32_t SceneBuilder::image(const std::string& name, TextureUse use, uint32_t fl
     scene.warnings.add("names of textures that differ from their files'", path_,
                        fmt::format("the texture {} does not exist; {}", shown(name), file.remark));
   return textures_.get(file.path, use, flags, path_);
+}
+
+PaintRef SceneBuilder::image_paint(int32_t texture) {
+  auto paint = std::make_shared<Paint>();
+  paint->kind = Paint::Kind::image, paint->texture = texture;
+  return paint;
+}
+
+Vec SceneBuilder::mean_of(const PaintRef& paint) const {
+  switch (paint->kind) {
+    case Paint::Kind::constant:
+      return paint->value;
+    case Paint::Kind::image:
+      return mean_of_texels(scene.textures.at(static_cast<size_t>(paint->texture) - 1));
+    case Paint::Kind::checker:
+      return (mean_of(paint->a) + mean_of(paint->b)) * 0.5;
+    case Paint::Kind::product: {
+      const Vec a = mean_of(paint->a), b = mean_of(paint->b);
+      return {a[0] * b[0], a[1] * b[1], a[2] * b[2]};
+    }
+    case Paint::Kind::mix: {
+      const Vec a = mean_of(paint->a), b = mean_of(paint->b);
+      return a + (b - a) * mean_of(paint->share)[0];
+    }
+    case Paint::Kind::invert:
+      return Vec{1, 1, 1} - mean_of(paint->a);
+    case Paint::Kind::power: {
+      Vec out = mean_of(paint->a);
+      for (double& x : out) x = std::pow(std::max(0.0, x), paint->value[0]);
+      return out;
+    }
+    default:
+      return {0.5, 0.5, 0.5};
+  }
 }
 
 int32_t SceneBuilder::compile(const PaintRef& paint, Program& program) {
@@ -511,7 +568,7 @@ void SceneBuilder::add(const std::string& name, const Geometry& geometry, const 
 }
 
 std::vector<Geometry> SceneBuilder::read_meshes(const std::string& name) {
-  const FoundFile file = find_beside(path_, name);
+  const FoundFile file = find(name);
   if (file.path.empty()) fail("", fmt::format("the mesh {} does not exist", shown(name)));
   if (!has_meshes(file.path)) fail("", fmt::format("the mesh {} is of no format that is read here", shown(name)));
   std::vector<Geometry> out;
@@ -526,16 +583,15 @@ void SceneBuilder::add_light(const lumicut_light& light, const std::string& name
   scene.light_names.push_back(name);
 }
 
-void SceneBuilder::add_profile_light(const Vec& position, const Vec& direction, const Vec& colour,
-                                     std::vector<float> angles, std::vector<float> values, const std::string& name) {
-  Profile profile;
+void SceneBuilder::add_profile_light(const Vec& position, const Vec& direction, const Vec& tangent, const Vec& colour,
+                                     Profile profile, const std::string& name) {
   profile.file = name;
-  profile.vertical = std::move(angles), profile.horizontal = {0}, profile.values = std::move(values);
   scene.profiles.push_back(std::move(profile));
   lumicut_light light{};
   light.type = LUMICUT_POINT, light.value = 1;
   light.profile = static_cast<uint32_t>(scene.profiles.size());
   store(light.position, position), store(light.direction, unit(direction)), store(light.color, colour);
+  store(light.tangent, tangent);
   add_light(light, name);
 }
 

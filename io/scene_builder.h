@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "io/affine.h"
+#include "io/find_beside.h"
 #include "io/scene_data.h"
 #include "io/spectra.h"
 #include "io/texture_store.h"
@@ -85,6 +86,9 @@ class SceneBuilder {
 
   // Image of that name beside the scene's file. 0, with a warning, where it is missing.
   int32_t image(const std::string& name, TextureUse use, uint32_t flags);
+  // A file beside the scene's, or in a folder that the scene names.
+  FoundFile find(const std::string& name) const;
+  void search_in(const std::string& folder) { folders_.push_back(folder); }
   TextureStore& textures() { return textures_; }
   const std::string& path() const { return path_; }
 
@@ -92,6 +96,9 @@ class SceneBuilder {
   PaintRef made(Paint paint) const;
   PaintRef product(const PaintRef& a, const PaintRef& b) const;
   PaintRef mixed(const PaintRef& a, const PaintRef& b, const PaintRef& share) const;
+  static PaintRef image_paint(int32_t texture);
+  // The mean of all texels, as if what is computed of them were linear; of places a half.
+  Vec mean_of(const PaintRef& paint) const;
 
   // A colour of a material: factor and texture. Values are cut to [0, most].
   void set_colour(const PaintRef& paint, float* factor, int32_t& texture, double most = 1);
@@ -118,9 +125,9 @@ class SceneBuilder {
   std::vector<Geometry> read_meshes(const std::string& name);
 
   void add_light(const lumicut_light& light, const std::string& name);
-  // Lights of falloff by the angle to `direction`: linear between (radians, W/sr).
-  void add_profile_light(const Vec& position, const Vec& direction, const Vec& colour, std::vector<float> angles,
-                         std::vector<float> values, const std::string& name);
+  // Of the light's `direction` and `tangent` the profile's angles are about; its `file` becomes the name.
+  void add_profile_light(const Vec& position, const Vec& direction, const Vec& tangent, const Vec& colour,
+                         Profile profile, const std::string& name);
   double exposure = 1;        // all light is multiplied by it
   bool emitters_seen = true;  // by the camera
   // What is not there is put in its place.
@@ -139,6 +146,7 @@ class SceneBuilder {
   PaintRef decoded(const PaintRef& paint, bool colour) const;
 
   std::string path_;
+  std::vector<std::string> folders_;
   TextureStore textures_;
   std::map<std::string, size_t> shared_;
   std::set<std::string> told_;

@@ -13,6 +13,7 @@
 #include <pugixml.hpp>
 #include <set>
 
+#include "io/curves.h"
 #include "io/file_error.h"
 #include "io/find_beside.h"
 #include "io/mitsuba_upgrade.h"
@@ -65,20 +66,23 @@ class Reader {
     if (std::string(root.name()) != "scene")
       throw FileError(path, fmt::format("its first element is <{}>, not <scene>", shown(root.name())));
     upgrade_mitsuba(root);
-    for (const Node& child : root.children()) gather(child);
+    const std::string folder = std::filesystem::path(path).parent_path().string();
+    for (const Node& child : root.children()) gather(child, folder);
     --depth_;
   }
-  // Names first: what refers to them may stand before them.
-  void gather(const Node& node) {
+  // Names first: what refers to them may stand before them. `folder`: that of the file.
+  void gather(const Node& node, const std::string& folder) {
     const std::string name = node.name();
     if (node.type() != pugi::node_element) return;
     if (name == "default") {
       defaults_.emplace(text(node, "name"), text(node, "value"));
     } else if (name == "include") {
       const std::string file = text(node, "filename");
-      const FoundFile found = find_beside(build_.path(), file);
+      const FoundFile found = build_.find(file);
       if (found.path.empty()) fail(node, fmt::format("the file {} does not exist", shown(file)));
       read_file(found.path);
+    } else if (name == "path") {
+      build_.search_in((std::filesystem::path(folder) / text(node, "value")).string());
     } else if (name == "alias") {
       const auto known = ids_.find(text(node, "id"));
       if (known == ids_.end()) fail(node, "there is no such id");
@@ -101,8 +105,6 @@ class Reader {
     const std::string name = node.name();
     if (name == "integrator") {
       integrator(node);
-    } else if (name == "path") {
-      build_.leave_out("<path>: files are searched for beside the scene");
     } else if (name == "medium" || name == "sampler" || name == "bsdf" || name == "texture" || name == "spectrum") {
       // read where they are used
     } else if (name == "emitter") {
@@ -338,7 +340,7 @@ class Reader {
     }
     if (kind == "spectrum" && node.attribute("filename")) {
       const std::string name = text(node, "filename");
-      const FoundFile file = find_beside(build_.path(), name);
+      const FoundFile file = build_.find(name);
       if (file.path.empty()) fail(node, fmt::format("the file {} does not exist", shown(name)));
       return in_rgb(pairs(node, without_comments(read_whole_file(file.path, kMostBytes))), light);
     }
@@ -524,6 +526,15 @@ class Reader {
     } else if (kind == "null") {
       m = default_material();
       m.opacity = kHole;
+    } else if (kind == "hair") {
+      m = default_material();
+      build_.approximate("hair is diffuse, of its colour");
+      const Node absorption = child(node, "sigma_a");
+      const double scale = number(node, "scale", 1);
+      const Vec sigma = absorption ? build_.mean_of(paint_of(absorption, true))
+                                   : hair_absorption(number(node, "eumelanin", 1.3), number(node, "pheomelanin", 0.2));
+      store(m.diffuse, hair_colour(sigma * scale, std::clamp(number(node, "azimuthal_roughness", 0.3), 0.0, 1.0)));
+      for (const char* key : {"longitudinal_roughness", "scale_tilt", "int_ior", "ext_ior"}) child(node, key);
     } else {
       build_.approximate(fmt::format("bsdfs of the kind {} are diffuse", kind));
       m = default_material();
@@ -656,6 +667,9 @@ class Reader {
         if (flat) g.normals.clear();
         if (turn != (kind != "obj")) g = upside_down(std::move(g));
       }
+    } else if (kind == "bsplinecurve" || kind == "linearcurve") {
+      all.push_back(curves(node, place, kind == "linearcurve"));
+      place = {};
     } else {
       build_.leave_out(fmt::format("shapes of the kind {}", kind));
       --depth_;
@@ -666,7 +680,10 @@ class Reader {
     for (const Node& inside : node.children()) {
       const Node c = std::string(inside.name()) == "ref" ? referred(inside) : inside;
       if (std::string(c.name()) == "emitter") {
-        if (text(c, "type") != "area") fail(c, "a shape emits as \"area\" alone");
+        if (text(c, "type") != "area") {
+          build_.leave_out(fmt::format("emitters of the kind {} on shapes", text(c, "type")));
+          continue;
+        }
         if (!group.empty()) {
           build_.leave_out("emitters inside of shape groups");
           continue;
@@ -691,6 +708,38 @@ class Reader {
     }
     --depth_;
   }
+  // Points and radii a line, curves apart by empty lines. Their places are moved by to_world, their radii are not.
+  Geometry curves(const Node& node, const Affine& place, bool straight) {
+    const std::string name = word(node, "filename", "");
+    const FoundFile file = build_.find(name);
+    if (file.path.empty()) fail(node, fmt::format("the file {} does not exist", shown(name)));
+    check_regular_file(file.path);
+    const std::string all = plain_text(read_whole_file(file.path, kMostBytes), file.path);
+    std::vector<Strand> strands(1);
+    size_t line = 0;
+    for (size_t at = 0; at < all.size(); ++line) {
+      const size_t end = std::min(all.find('\n', at), all.size());
+      const auto list = numbers(node, all.substr(at, end - at));
+      at = end + 1;
+      if (list.empty()) {
+        if (!strands.back().empty()) strands.emplace_back();
+        continue;
+      }
+      if (list.size() != 4 || !(list[3] >= 0))
+        throw FileError(file.path, fmt::format("line {}: is no point and radius", line + 1));
+      strands.back().push_back({place.point({list[0], list[1], list[2]}), list[3], {0, 0, 0}});
+    }
+    if (strands.back().empty()) strands.pop_back();
+    if (strands.empty()) throw FileError(file.path, "has no points");
+    for (Strand& strand : strands) {
+      if (strand.size() < (straight ? 2 : 4))
+        throw FileError(file.path, fmt::format("has a curve of {} points", strand.size()));
+      if (!straight) strand = bezier_strand(bezier_of_bspline(strand, 3), 3);
+      curve_points_ += strand.size();
+      if (curve_points_ > kMostCurvePoints) throw FileError(file.path, "has too many curves");
+    }
+    return curve_geometry(strands);
+  }
   // Even media that glass holds: what they absorb.
   uint32_t filled(const Node& medium, uint32_t material) {
     std::optional<uint32_t> glass;
@@ -709,7 +758,7 @@ class Reader {
   }
   std::vector<Geometry> serialized(const Node& node) {
     const std::string name = word(node, "filename", "");
-    const FoundFile file = find_beside(build_.path(), name);
+    const FoundFile file = build_.find(name);
     if (file.path.empty()) fail(node, fmt::format("the mesh {} does not exist", shown(name)));
     const double index = number(node, "shape_index", 0);
     if (!(index >= 0 && index < 1e9)) fail(node, fmt::format("its shape_index is {}", index));
@@ -825,11 +874,15 @@ class Reader {
       if (!(cutoff > 0 && cutoff <= 90 && beam >= 0 && beam <= cutoff))
         fail(node, fmt::format("its angles are {} and {} degrees", beam, cutoff));
       // Even to the beam's edge, then linear in the angle.
-      std::vector<float> angles = {0}, values = {1};
-      if (beam > 0) angles.push_back(static_cast<float>(radians(beam))), values.push_back(1);
-      if (cutoff > beam + 1e-3) angles.push_back(static_cast<float>(radians(cutoff))), values.push_back(0);
+      Profile profile{"", {0}, {0}, {1}};
+      const auto at = [&](double angle, float value) {
+        profile.vertical.push_back(static_cast<float>(radians(angle))), profile.values.push_back(value);
+      };
+      if (beam > 0) at(beam, 1);
+      if (cutoff > beam + 1e-3) at(cutoff, 0);
       if (child(node, "texture")) build_.leave_out("textures of spots");
-      build_.add_profile_light(place.column(3), place.column(2), light_colour(node, "intensity"), angles, values, name);
+      build_.add_profile_light(place.column(3), place.column(2), {0, 0, 0}, light_colour(node, "intensity"),
+                               std::move(profile), name);
     } else if (kind == "directional") {
       l.type = LUMICUT_SUN;
       const Vec direction = child(node, "direction") ? vector_of(child(node, "direction"), {0, 0, 1}) : place.column(2);
@@ -875,6 +928,7 @@ class Reader {
   mutable std::map<size_t, std::set<std::string>> asked_;  // names, by node
   std::optional<Geometry> sphere_;
   uint32_t grey_ = 0;
+  size_t curve_points_ = 0;
   int depth_ = 0;
   bool has_camera_ = false;
 };

@@ -13,6 +13,7 @@
 #include <set>
 #include <tuple>
 
+#include "io/curves.h"
 #include "io/file_error.h"
 #include "io/find_beside.h"
 #include "io/loop_subdivision.h"
@@ -42,6 +43,15 @@ struct State {
   std::map<std::string, PbrtParameters> given;  // by Attribute to shapes, lights, materials ...
 };
 
+// Curves that follow each other under one state: one mesh.
+struct Curves {
+  std::vector<Strand> strands;
+  std::string name;
+  Affine place;
+  uint32_t material = 0;
+  bool reversed = false;
+};
+
 // A shape of an object that is placed later.
 struct Part {
   std::string name, key;
@@ -65,6 +75,7 @@ class Reader {
       statement(token->text);
     }
     if (!stack_.empty()) tokens_.fail("an AttributeBegin has no end");
+    put_curves();
     if (has_camera_) finish_camera();
     return build_.finish(has_camera_);
   }
@@ -174,10 +185,12 @@ class Reader {
     } else if (word == "ObjectBegin") {
       if (object_) tokens_.fail("ObjectBegin inside of an object");
       stack_.push_back(state_);
+      put_curves();
       object_ = quoted("ObjectBegin");
       objects_[*object_].clear();
     } else if (word == "ObjectEnd") {
       if (!object_ || stack_.empty()) tokens_.fail("ObjectEnd without its beginning");
+      put_curves();
       object_.reset();
       state_ = std::move(stack_.back());
       stack_.pop_back();
@@ -395,8 +408,8 @@ class Reader {
     }
     if (use == Use::light) {
       const Vec rgb = rgb_of_spectrum(spectrum);
-      const double luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-      return luminance > 0 ? rgb * (1 / luminance) : rgb;
+      const double white = luminance(rgb);
+      return white > 0 ? rgb * (1 / white) : rgb;
     }
     return rgb_of_reflectance(spectrum);
   }
@@ -522,7 +535,7 @@ class Reader {
   // ---- Materials
 
   // The library's roughness is the root of GGX's alpha, which is the root of pbrt's roughness where that is remapped.
-  void set_roughness(const Parameters& p, const std::string& prefix, lumicut_material& m) {
+  PaintRef roughness(const Parameters& p, const std::string& prefix) {
     PaintRef rough = paint(p, (prefix + "roughness").c_str(), 0, true);
     const bool u = p.find(prefix + "uroughness") != nullptr, v = p.find(prefix + "vroughness") != nullptr;
     if (u || v) {
@@ -531,8 +544,10 @@ class Reader {
       if (rough != along_v && (!constant_of(rough) || constant_of(rough) != constant_of(along_v)))
         build_.approximate("roughness that differs along u and v is taken as that along u");
     }
-    build_.set_number(power_paint(rough, p.truth("remaproughness", true) ? 0.25 : 0.5), m.roughness,
-                      m.roughness_texture);
+    return power_paint(rough, p.truth("remaproughness", true) ? 0.25 : 0.5);
+  }
+  void set_roughness(const Parameters& p, const std::string& prefix, lumicut_material& m) {
+    build_.set_number(roughness(p, prefix), m.roughness, m.roughness_texture);
   }
   double index(const Parameters& p, const char* name, double otherwise) {
     const Vec eta = colour(p.find(name), {otherwise, otherwise, otherwise}, Use::number);
@@ -586,9 +601,9 @@ class Reader {
       m.coat = 1, m.coat_ior = static_cast<float>(std::max(1.0, index(p, "interface.eta", 1.5)));
       set_metal(p, "conductor.", m.coat_ior, m);
       set_roughness(p, "conductor.", m);
-      lumicut_material coat{};
-      set_roughness(p, "interface.", coat);
-      m.coat_roughness = coat.roughness;
+      const PaintRef rough = roughness(p, "interface.");
+      if (!constant_of(rough)) build_.approximate("textures of interface.roughness are their mean");
+      m.coat_roughness = static_cast<float>(std::clamp(build_.mean_of(rough)[0], 0.0, 1.0));
     } else if (kind == "dielectric" || kind == "thindielectric") {
       ggx();
       m.transmission = 1, m.ior = static_cast<float>(index(p, "eta", 1.5));
@@ -617,6 +632,9 @@ class Reader {
       return build_.mix_materials(name, first, second, amount);
     } else if (kind.empty() || kind == "interface" || kind == "none") {
       m.opacity = kHole;  // in mixes; shapes of it alone are not there
+    } else if (kind == "hair") {
+      build_.approximate("hair is diffuse, of its colour");
+      set_hair(p, m);
     } else {
       build_.approximate(fmt::format("the material \"{}\" of the kind {} is diffuse", name, kind));
       build_.set_colour(paint(p, "reflectance", 0.5), m.diffuse, m.diffuse_texture);
@@ -631,6 +649,23 @@ class Reader {
     }
     finish_material(kind, p);
     return build_.add_material(name, m);
+  }
+  void set_hair(const Parameters& p, lumicut_material& m) {
+    const char* name = p.find("reflectance") != nullptr ? "reflectance" : "color";
+    const PbrtParameter* absorption = p.find("sigma_a");
+    for (const char* ignored : {"beta_m", "alpha", "eta"}) p.ignore(ignored);
+    const double azimuthal = std::clamp(p.number("beta_n", 0.3), 0.0, 1.0);
+    const bool melanin = p.find("eumelanin") != nullptr || p.find("pheomelanin") != nullptr;
+    if (absorption == nullptr && p.find(name) != nullptr)
+      return build_.set_colour(paint(p, name, 0.5), m.diffuse, m.diffuse_texture);
+    if (absorption != nullptr && absorption->type == "texture") {
+      build_.approximate("textures of sigma_a are their mean");
+      return store(m.diffuse, hair_colour(build_.mean_of(paint(p, "sigma_a", 1)), azimuthal));
+    }
+    const Vec sigma = absorption != nullptr
+                          ? colour(absorption, {1, 1, 1}, Use::number)
+                          : hair_absorption(p.number("eumelanin", melanin ? 0 : 1.3), p.number("pheomelanin", 0));
+    store(m.diffuse, hair_colour(sigma, azimuthal));
   }
   void finish_material(const std::string& kind, const Parameters& p) {
     p.ignore("type"), p.ignore("maxdepth"), p.ignore("nsamples");
@@ -684,17 +719,54 @@ class Reader {
       set_value(l, radiance, scale, name);
     } else if (kind == "infinite") {
       infinite(p, scale, name);
+    } else if (kind == "goniometric") {
+      goniometric(p, scale, name);
     } else {
       build_.leave_out(fmt::format("lights of the kind {}", kind));
       for (const PbrtParameter& q : p.list) p.ignore(q.name);
     }
   }
-  void set_value(lumicut_light& l, const Vec& rgb, double scale, const std::string& name) {
-    for (size_t k = 0; k < 3; ++k) {
-      if (!(rgb[k] >= 0 && rgb[k] <= 1e15)) tokens_.fail(fmt::format("{} has a colour of {}", name, rgb[k]));
-      l.color[k] = static_cast<float>(rgb[k]);
+  // Its picture lies on the octahedron about the light's y, in coordinates whose y and z have changed places.
+  void goniometric(const Parameters& p, double scale, const std::string& name) {
+    const Vec intensity = colour(p.find("I"), {1, 1, 1}, Use::light);
+    const double power = p.number("power", -1);
+    const std::string file = p.word("filename", "");
+    const int32_t number = file.empty() ? 0 : build_.image(file, TextureUse::radiance, 0);
+    if (number == 0) return build_.leave_out("goniometric lights without a picture");
+    const Texture& picture = build_.scene.textures.at(static_cast<size_t>(number) - 1);
+    if (picture.width != picture.height)
+      tokens_.fail(fmt::format("{} has a picture of {} by {} texels", name, picture.width, picture.height));
+    double mean = 0;
+    for (const float x : picture.floats) mean += x;
+    mean /= double(picture.floats.size());
+    if (power > 0 && mean > 0) scale *= power / (4 * kPi * mean);
+    const Vec x = unit(state_.ctm.column(0)), y = unit(state_.ctm.column(2)), z = unit(state_.ctm.column(1));
+    const double turn = dot(cross(x, z), y) < 0 ? -1 : 1;
+    const uint32_t steps = std::clamp(picture.width, 16u, 256u);
+    Profile profile;
+    for (uint32_t i = 0; i <= steps; ++i) profile.vertical.push_back(static_cast<float>(kPi * i / steps));
+    for (uint32_t i = 0; i <= 2 * steps; ++i) {
+      profile.horizontal.push_back(static_cast<float>(kPi * i / steps));
+      for (const float down : profile.vertical) {
+        const double around = kPi * i / steps;
+        const Vec direction{std::sin(down) * std::cos(around), turn * std::sin(down) * std::sin(around),
+                            std::cos(down)};
+        double sum = 0;
+        for (size_t k = 0; k < picture.channels; ++k) sum += octahedral(picture, direction, k);
+        profile.values.push_back(static_cast<float>(std::max(0.0, sum / picture.channels)));
+      }
     }
+    check_value(intensity, scale, name);
+    build_.add_profile_light(state_.ctm.column(3), z, x, intensity * scale, std::move(profile), name);
+  }
+  void check_value(const Vec& rgb, double scale, const std::string& name) {
+    for (const double c : rgb)
+      if (!(c >= 0 && c <= 1e15)) tokens_.fail(fmt::format("{} has a colour of {}", name, c));
     if (!(scale >= 0 && scale < 1e20)) tokens_.fail(fmt::format("{} has a scale of {}", name, scale));
+  }
+  void set_value(lumicut_light& l, const Vec& rgb, double scale, const std::string& name) {
+    check_value(rgb, scale, name);
+    store(l.color, rgb);
     l.value = static_cast<float>(scale);
     build_.add_light(l, name);
   }
@@ -735,7 +807,7 @@ class Reader {
       const double weight = std::sin(latitude) * std::cos(latitude) * kPi / t.height * 2 * kPi / t.width;
       for (size_t c = 0; c < t.width; ++c) {
         const float* x = &t.floats[(row * t.width + c) * t.channels];
-        sum += weight * (t.channels == 3 ? 0.2126 * x[0] + 0.7152 * x[1] + 0.0722 * x[2] : x[0]);
+        sum += weight * (t.channels == 3 ? luminance({x[0], x[1], x[2]}) : x[0]);
       }
     }
     return sum;
@@ -750,6 +822,27 @@ class Reader {
         for (size_t k = 0; k < n; ++k)
           t.floats[(row * t.width + c) * n + k] = before[(row * t.width + (t.width - 1 - c)) * n + k];
   }
+  // Bilinear inside of the square; at its border the nearest texel.
+  static double octahedral(const Texture& from, const Vec& direction, size_t channel) {
+    const auto [x, y, z] = direction;
+    const size_t size = from.width;
+    const double radius = std::sqrt(std::max(0.0, 1 - std::abs(z)));
+    const double high = std::max(std::abs(x), std::abs(y)), low = std::min(std::abs(x), std::abs(y));
+    double part = high > 0 ? std::atan(low / high) * 2 / kPi : 0;
+    if (std::abs(x) < std::abs(y)) part = 1 - part;
+    double v = part * radius, u = radius - v;
+    if (z < 0) std::swap(u, v), u = 1 - u, v = 1 - v;
+    u = std::copysign(u, x), v = std::copysign(v, y);
+    const double px = std::clamp((u + 1) / 2 * double(size) - 0.5, 0.0, double(size - 1)),
+                 py = std::clamp((v + 1) / 2 * double(size) - 0.5, 0.0, double(size - 1));
+    const auto x0 = static_cast<size_t>(px), y0 = static_cast<size_t>(py);
+    const size_t x1 = std::min(x0 + 1, size - 1), y1 = std::min(y0 + 1, size - 1);
+    const double fx = px - double(x0), fy = py - double(y0);
+    const auto at = [&](size_t ix, size_t iy) {
+      return double{from.floats[(iy * size + ix) * from.channels + channel]};
+    };
+    return (at(x0, y0) * (1 - fx) + at(x1, y0) * fx) * (1 - fy) + (at(x0, y1) * (1 - fx) + at(x1, y1) * fx) * fy;
+  }
   // A map by latitude and longitude of one on pbrt's equal-area octahedron. [Clarberg 2008]
   int32_t unrolled(int32_t square) {
     const Texture from = build_.scene.textures.at(static_cast<size_t>(square) - 1);
@@ -761,31 +854,14 @@ class Reader {
     out.file = from.file;
     out.height = std::clamp(from.width, 16u, 4096u), out.width = 2 * out.height, out.channels = from.channels;
     out.floats.resize(size_t{out.width} * out.height * out.channels);
-    const size_t n = from.channels, size = from.width;
     for (size_t row = 0; row < out.height; ++row)
       for (size_t col = 0; col < out.width; ++col) {
         const double latitude = kPi * (0.5 - (double(row) + 0.5) / out.height),
                      longitude = 2 * kPi * (0.5 - (double(col) + 0.5) / out.width);
-        const double x = std::cos(latitude) * std::cos(longitude), y = std::cos(latitude) * std::sin(longitude),
-                     z = std::sin(latitude);
-        const double radius = std::sqrt(std::max(0.0, 1 - std::abs(z)));
-        const double high = std::max(std::abs(x), std::abs(y)), low = std::min(std::abs(x), std::abs(y));
-        double part = high > 0 ? std::atan(low / high) * 2 / kPi : 0;
-        if (std::abs(x) < std::abs(y)) part = 1 - part;
-        double v = part * radius, u = radius - v;
-        if (z < 0) std::swap(u, v), u = 1 - u, v = 1 - v;
-        u = std::copysign(u, x), v = std::copysign(v, y);
-        // Bilinear inside of the square; at its border the nearest texel.
-        const double px = std::clamp((u + 1) / 2 * double(size) - 0.5, 0.0, double(size - 1)),
-                     py = std::clamp((v + 1) / 2 * double(size) - 0.5, 0.0, double(size - 1));
-        const auto x0 = static_cast<size_t>(px), y0 = static_cast<size_t>(py);
-        const size_t x1 = std::min(x0 + 1, size - 1), y1 = std::min(y0 + 1, size - 1);
-        const double fx = px - double(x0), fy = py - double(y0);
-        for (size_t k = 0; k < n; ++k) {
-          const auto at = [&](size_t ix, size_t iy) { return double{from.floats[(iy * size + ix) * n + k]}; };
-          out.floats[(row * out.width + col) * n + k] = static_cast<float>(
-              (at(x0, y0) * (1 - fx) + at(x1, y0) * fx) * (1 - fy) + (at(x0, y1) * (1 - fx) + at(x1, y1) * fx) * fy);
-        }
+        const Vec direction{std::cos(latitude) * std::cos(longitude), std::cos(latitude) * std::sin(longitude),
+                            std::sin(latitude)};
+        for (size_t k = 0; k < from.channels; ++k)
+          out.floats[(row * out.width + col) * from.channels + k] = static_cast<float>(octahedral(from, direction, k));
       }
     build_.scene.textures.push_back(std::move(out));
     return static_cast<int32_t>(build_.scene.textures.size());
@@ -806,16 +882,24 @@ class Reader {
       if (z0 <= -1 && z1 >= 1 && sweep > 2 * kPi - 1e-6)
         g = sphere(), key = "sphere";
       else
-        g = sphere_part_geometry(std::min(z0, z1), std::max(z0, z1), sweep);
+        g = sphere_part_geometry(std::min(z0, z1), std::max(z0, z1), sweep),
+        key = fmt::format("sphere {} {} {}", z0, z1, sweep);
       place = place * scaling({radius, radius, radius});
     } else if (kind == "disk") {
-      g = disk_geometry(p.number("height", 0), radius, p.number("innerradius", 0), sweep);
+      const double height = p.number("height", 0), inner = p.number("innerradius", 0);
+      g = disk_geometry(height, radius, inner, sweep);
+      key = fmt::format("disk {} {} {} {}", height, radius, inner, sweep);
     } else if (kind == "cylinder") {
-      g = cylinder_geometry(radius, p.number("zmin", -1), p.number("zmax", 1), sweep);
+      const double z0 = p.number("zmin", -1), z1 = p.number("zmax", 1);
+      g = cylinder_geometry(radius, z0, z1, sweep);
+      key = fmt::format("cylinder {} {} {} {}", radius, z0, z1, sweep);
     } else if (kind == "trianglemesh" || kind == "loopsubdiv" || kind == "bilinearmesh") {
       g = mesh(p, kind == "bilinearmesh" ? 4 : 3, name);
       if (kind == "loopsubdiv") subdivide(p, g, name);
       for (const char* unused : {"S", "faceIndices", "scheme"}) p.ignore(unused);
+    } else if (kind == "curve") {
+      curve(p, name);
+      return;
     } else if (kind == "plymesh") {
       several = build_.read_meshes(p.word("filename", ""));
       for (Geometry& one : several) follow_normals(one);
@@ -840,6 +924,53 @@ class Reader {
     // Normals of meshes follow their transform; those of the others are the product of two tangents that do.
     const bool turned = (kind == "sphere" || kind == "disk" || kind == "cylinder") && place.determinant() < 0;
     for (Geometry& one : several) put(name, std::move(one), place, used, state_.reversed != turned, key, mask);
+  }
+  void curve(const Parameters& p, const std::string& name) {
+    const double given = p.number("degree", 3), width = p.number("width", 1);
+    const std::string basis = p.word("basis", "bezier"), type = p.word("type", "flat");
+    if (given != 2 && given != 3) tokens_.fail(fmt::format("{} has the degree {}", name, given));
+    if (basis != "bezier" && basis != "bspline") tokens_.fail(fmt::format("{} has the basis {}", name, shown(basis)));
+    const auto degree = static_cast<size_t>(given);
+    const PbrtParameter *places = p.find("P"), *normals = p.find("N");
+    const size_t count = places == nullptr ? 0 : places->numbers.size() / 3;
+    if (count <= degree || places->numbers.size() % 3 != 0 || (basis == "bezier" && (count - 1) % degree != 0))
+      tokens_.fail(fmt::format("{} has {} numbers in P", name, places == nullptr ? 0 : places->numbers.size()));
+    Strand points(count);
+    for (size_t i = 0; i < count; ++i) std::copy_n(&places->numbers[3 * i], 3, points[i].place.begin());
+    if (basis == "bspline") points = bezier_of_bspline(points, degree);
+    const size_t segments = (points.size() - 1) / degree;
+    if (type == "ribbon" && (normals == nullptr || normals->numbers.size() != 3 * (segments + 1)))
+      tokens_.fail(fmt::format("{}, a ribbon of {} segments, has other numbers of N", name, segments));
+    if (type == "flat") build_.approximate("flat curves, which turn to whoever sees them, are tubes");
+    const double w0 = p.number("width0", width), w1 = p.number("width1", width);
+    if (!(w0 >= 0 && w1 >= 0)) tokens_.fail(fmt::format("{} has the widths {} and {}", name, w0, w1));
+    // Widths and normals are linear between the ends of the curve and of its segments.
+    for (size_t i = 0; i < points.size(); ++i) {
+      points[i].radius = 0.5 * (w0 + (w1 - w0) * double(i) / double(points.size() - 1));
+      if (type != "ribbon") continue;
+      const size_t segment = std::min(i / degree, segments - 1);
+      const double t = double(i - segment * degree) / double(degree);
+      Vec a, b;
+      std::copy_n(&normals->numbers[3 * segment], 3, a.begin());
+      std::copy_n(&normals->numbers[3 * segment + 3], 3, b.begin());
+      points[i].normal = unit(a) * (1 - t) + unit(b) * t;
+    }
+    p.ignore("splitdepth");
+    if (state_.nothing && !state_.area_light) return build_.leave_out("borders of media");
+    const uint32_t material = with_alpha(state_.material, p);
+    if (!curves_.strands.empty() && (curves_.material != material || curves_.reversed != state_.reversed ||
+                                     curves_.place.m != state_.ctm.m || state_.area_light))
+      put_curves();
+    if (curves_.strands.empty()) curves_ = {{}, name, state_.ctm, material, state_.reversed};
+    curves_.strands.push_back(bezier_strand(points, degree));
+    curve_points_ += curves_.strands.back().size();
+    if (curve_points_ > kMostCurvePoints) tokens_.fail("there are too many curves");
+    if (state_.area_light) put_curves();
+  }
+  void put_curves() {
+    if (!curves_.strands.empty())
+      put(curves_.name, curve_geometry(curves_.strands), curves_.place, curves_.material, curves_.reversed, "", 0);
+    curves_ = {};
   }
   // Even media that glass holds: what they absorb.
   void medium(const std::string& name, const Parameters& p) {
@@ -871,8 +1002,8 @@ class Reader {
     }
     if (!object_) return build_.add(name, g, place, material, flipped, key, mask);
     auto& parts = objects_[*object_];
-    const std::string own = fmt::format("object \"{}\" {}", *object_, parts.size());
-    parts.push_back({name, own, std::make_shared<Geometry>(std::move(g)), place, material, flipped, mask});
+    const std::string shared = key.empty() ? fmt::format("object \"{}\" {}", *object_, parts.size()) : key;
+    parts.push_back({name, shared, std::make_shared<Geometry>(std::move(g)), place, material, flipped, mask});
   }
   void subdivide(const Parameters& p, Geometry& g, const std::string& name) {
     const double levels = p.number("levels", 3);
@@ -1001,6 +1132,7 @@ class Reader {
         }
         area += length(cross(q[1] - q[0], q[2] - q[0])) / 2;
       }
+      if (picture != 0) area *= luminance(build_.mean_of(build_.image_paint(picture)));
       if (area > 0) scale *= power / (area * kPi * (both ? 2 : 1));
     }
     if (!(scale >= 0 && scale < 1e15)) tokens_.fail(fmt::format("an area light has a scale of {}", scale));
@@ -1018,13 +1150,14 @@ class Reader {
   std::map<std::string, std::pair<Vec, bool>> media_;           // 1/length that they absorb, and whether they scatter
   std::map<std::string, std::vector<Part>> objects_;
   std::optional<std::string> object_;
+  Curves curves_;
   std::optional<Geometry> sphere_;
   std::optional<uint32_t> black_;
   std::string camera_kind_;
   Parameters camera_;
   Affine camera_place_;
   bool has_camera_ = false;
-  size_t instances_ = 0;
+  size_t instances_ = 0, curve_points_ = 0;
 };
 
 }  // namespace

@@ -122,8 +122,8 @@ Vec blackbody_radiance(double kelvin) {
 
 Vec blackbody(double kelvin) {
   const Vec rgb = blackbody_radiance(kelvin);
-  const double luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-  return luminance > 0 ? rgb * (1 / luminance) : Vec{1, 0, 0};
+  const double white = luminance(rgb);
+  return white > 0 ? rgb * (1 / white) : Vec{1, 0, 0};
 }
 
 Vec rgb_of_reflectance(const Spectrum& spectrum) {
@@ -131,6 +131,17 @@ Vec rgb_of_reflectance(const Spectrum& spectrum) {
   Vec rgb = rgb_of_spectrum(spectrum);
   for (size_t k = 0; k < 3; ++k) rgb[k] /= flat[k];
   return rgb;
+}
+
+Vec hair_absorption(double eumelanin, double pheomelanin) {
+  return Vec{0.419, 0.697, 1.37} * std::max(0.0, eumelanin) + Vec{0.187, 0.4, 1.05} * std::max(0.0, pheomelanin);
+}
+
+Vec hair_colour(const Vec& absorption, double azimuthal) {
+  const double b = azimuthal, per_root = 5.969 + b * (-0.215 + b * (2.532 + b * (-10.73 + b * (5.574 + b * 0.245))));
+  Vec out;
+  for (size_t k = 0; k < 3; ++k) out[k] = std::exp(-std::sqrt(std::max(0.0, absorption[k])) * per_root);
+  return out;
 }
 
 }  // namespace lumicut::io

@@ -272,12 +272,53 @@ class Mitsuba(SceneFiles):
         np.testing.assert_allclose(found[4, 4], 0.5 * 2 * 0.25 / 1.25, rtol=0.03)  # through the lamp, on the floor
         self.assertEqual(found[0, 0].max(), 0)  # beside the floor
 
+    def test_curves_are_moved_and_keep_their_radii(self):
+        # Two curves: one of evenly placed points, one that is straight after its middle.
+        self.write("curves.txt", "0 0 0 .1\n1 0 0 .1\n2 0 0 .1\r\n3 0 0 .1\n\n\n0 0 5 .2\n0 0 6 .2\n0 0 7 .2\n0 0 8 .2\n0 0 9 .2\n")
+        for kind, ends in (("bsplinecurve", ((1, 2), (6, 8))), ("linearcurve", ((0, 3), (5, 9)))):
+            path = self.write("curves.xml", scene(f'<shape type="{kind}"><string name="filename" value="curves.txt"/>' + placed('<scale value="2"/>', '<translate y="1"/>') + "</shape>"))
+            self.assert_ends(lumicut("convert", path, self.folder / "curves.json"), OK)
+            mesh = json.loads((self.folder / "curves.json").read_text())["meshes"][0]["positions"]
+            flat = np.array(mesh) if isinstance(mesh, list) else np.fromfile(self.folder / mesh["file"], np.float32, 3 * mesh["count"], offset=mesh.get("offset", 0))
+            rings = flat.reshape(-1, 12, 3)
+            middles = rings.mean(axis=1)
+            radii = np.linalg.norm(rings - middles[:, None], axis=2) * 12 * math.sin(math.pi / 12) / math.pi
+            first = np.abs(middles[:, 2]) < 1
+            np.testing.assert_allclose(middles[first][[0, -1]], [(2 * x, 1, 0) for x in ends[0]], atol=1e-5)
+            np.testing.assert_allclose(middles[~first][[0, -1]], [(0, 1, 2 * z) for z in ends[1]], atol=1e-5)
+            np.testing.assert_allclose(radii[first], 0.1, rtol=1e-5)
+            np.testing.assert_allclose(radii[~first], 0.2, rtol=1e-5)
+        for text, said in (("1 2 3\n", "line 1"), ("", "no points"), ("0 0 0 1\n1 0 0 1\n", "2 points"), ("0 0 0 1\n0 0 0 -1", "line 2")):
+            self.write("curves.txt", text)
+            path = self.write("curves.xml", scene('<shape type="bsplinecurve"><string name="filename" value="curves.txt"/></shape>'))
+            self.assert_ends(lumicut("render", path, "-o", self.folder / "x.exr"), BAD_FILE, "curves.txt", said)
+
+    def test_files_are_searched_for_where_path_says(self):
+        (self.folder / "common/parts").mkdir(parents=True)
+        (self.folder / "scenes").mkdir()
+        self.write("common/a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        self.write("common/parts/part.xml", scene('<path value="../.."/>', '<shape type="obj"><string name="filename" value="a.obj"/></shape>',
+                                                  '<shape type="obj"><string name="filename" value="b.obj"/></shape>'))
+        self.write("b.obj", "v 0 0 1\nv 1 0 1\nv 0 1 1\nf 1 2 3\n")
+        path = self.write("scenes/main.xml", scene('<path value="../common"/>', '<include filename="parts/part.xml"/>'))
+        self.assertEqual(json.loads(lumicut("check", "--no-forecast", "--json", path).stdout)["counts"]["triangles"], 2)
+
+    def test_hair_has_the_colour_that_its_pigments_give(self):
+        path = self.write("hair.xml", scene('<shape type="sphere"><bsdf type="hair"><float name="eumelanin" value=".5"/><float name="pheomelanin" value=".1"/></bsdf></shape>'))
+        self.assert_ends(lumicut("convert", path, self.folder / "hair.json"), OK)
+        found = json.loads((self.folder / "hair.json").read_text())["materials"][-1]["diffuse"]
+        sigma = 0.5 * np.array([0.419, 0.697, 1.37]) + 0.1 * np.array([0.187, 0.4, 1.05])
+        b = 0.3
+        per_root = 5.969 - 0.215 * b + 2.532 * b ** 2 - 10.73 * b ** 3 + 5.574 * b ** 4 + 0.245 * b ** 5
+        np.testing.assert_allclose(found, np.exp(-per_root * np.sqrt(sigma)), rtol=1e-5)
+
     def test_what_is_not_supported_is_named(self):
         path = self.floor('<emitter type="projector"/>', '<shape type="cube"><bsdf type="null"/><medium type="homogeneous" name="interior"/></shape>', '<emitter type="point"/>',
-                          '<shape type="bsplinecurve"/>', '<shape type="sphere"><bsdf type="hair"/></shape>',
+                          '<shape type="sdfgrid"/>', '<shape type="sphere"><bsdf type="measured"/><emitter type="directionalarea"/></shape>',
                           '<shape type="sphere"><float name="wide" value="2"/><bsdf type="roughplastic"><boolean name="odd" value="true"/></bsdf></shape>')
         _, said = self.render(path, "--vpls", 10)
-        for text in ("emitters of the kind projector: left out", "media: left out", "bsdfs of the kind hair are diffuse", "shapes of the kind bsplinecurve: left out",
+        for text in ("emitters of the kind projector: left out", "media: left out", "bsdfs of the kind measured are diffuse", "shapes of the kind sdfgrid: left out",
+                     "emitters of the kind directionalarea on shapes: left out",
                      "wide of sphere: left out", "odd of roughplastic: left out"):
             self.assertIn(text, said)
 

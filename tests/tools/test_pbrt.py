@@ -256,6 +256,62 @@ class Pbrt(SceneFiles):
         mix = 'AttributeBegin Rotate 60 0 1 0 Texture "t" "spectrum" "directionmix" "vector3 dir" [ 0 0 2 ] "rgb tex1" [ .8 0 0 ] "rgb tex2" [ 0 .8 0 ] AttributeEnd'
         np.testing.assert_allclose(self.square(mix, 'Material "diffuse" "texture reflectance" "t"')[0][1, 1], (0.4, 0.4, 0), atol=1e-5)
 
+    def test_hair_has_the_colour_that_its_pigments_give(self):
+        def colour(words):
+            scene = self.write("hair.pbrt", f'Film "rgb"\nWorldBegin\nMaterial "hair" {words}\nShape "sphere"')
+            self.assert_ends(lumicut("convert", scene, self.folder / "hair.json"), OK)
+            return json.loads((self.folder / "hair.json").read_text())["materials"][-1]["diffuse"]
+        # pbrt's own inversion: the absorption of a colour is (ln c / polynomial)².
+        wanted = np.array([0.8, 0.5, 0.2])
+        per_root = 5.969 - 0.215 * 0.3 + 2.532 * 0.3 ** 2 - 10.73 * 0.3 ** 3 + 5.574 * 0.3 ** 4 + 0.245 * 0.3 ** 5
+        sigma = (np.log(wanted) / per_root) ** 2
+        np.testing.assert_allclose(colour(f'"rgb sigma_a" [ {" ".join(map(str, sigma))} ]'), wanted, rtol=1e-5)
+        np.testing.assert_allclose(colour('"rgb reflectance" [ .8 .5 .2 ]'), wanted, rtol=1e-6)
+        np.testing.assert_allclose(colour(""), np.exp(-per_root * np.sqrt(1.3 * np.array([0.419, 0.697, 1.37]))), rtol=1e-5)
+        np.testing.assert_allclose(colour('"float pheomelanin" 2'), np.exp(-per_root * np.sqrt(2 * np.array([0.187, 0.4, 1.05]))), rtol=1e-5)
+
+    def test_goniometric_lights_shine_by_their_picture(self):
+        # The middle of the square lies along the light's y, its corners opposite; x and y of the square are x and z.
+        pixels = np.zeros((32, 32, 3), np.float32)
+        pixels[10:22, 10:22] = 3
+        pixels[8:24, 26:] = 5
+        pixels[:6, 8:24] = 7
+        self.write_exr("lamp.exr", pixels)
+        light = 'AttributeBegin Translate 0 2 0 {} LightSource "goniometric" "rgb I" [ 8 4 2 ] "string filename" "lamp.exr" {} AttributeEnd'.format
+        for turn, value in (("Rotate 180 1 0 0", 3), ("", 0), ("Rotate -90 0 0 1", 5), ("Rotate 90 0 0 1", 0), ("Rotate -90 0 0 1 Scale 1 1 -1", 5),
+                            ("Rotate 90 1 0 0", 0), ("Rotate -90 1 0 0", 7), ("Rotate 90 1 0 0 Scale 1 1 -1", 7), ("Rotate -90 1 0 0 Scale 1 1 -1", 0)):
+            with self.subTest(turn):
+                np.testing.assert_allclose(self.lamp(self.floor(light(turn, ""))), 0.5 / math.pi * value * np.array([8, 4, 2]) / 4, rtol=5e-3)
+        power = self.lamp(self.floor(light("Rotate 180 1 0 0", '"float power" 50').replace("8 4 2", "1 1 1")))
+        np.testing.assert_allclose(power, 0.5 / math.pi * 3 * 50 / (4 * math.pi * pixels.mean()) / 4, rtol=5e-3)
+
+    def test_pictures_of_area_lights_have_the_power_that_is_asked_for(self):
+        pixels = np.full((8, 8, 3), 0.25, np.float32)
+        pixels[:4] = (0.5, 1, 0)
+        self.write_exr("lamp.exr", pixels)
+        scene = self.write("lamp.pbrt", 'Film "rgb"\nWorldBegin\nAreaLightSource "diffuse" "string filename" "lamp.exr" "float power" 10\n'
+                           'Shape "bilinearmesh" "point3 P" [ 0 0 0 2 0 0 0 1 0 2 1 0 ]')
+        self.assert_ends(lumicut("convert", scene, self.folder / "lamp.json"), OK)
+        emission = json.loads((self.folder / "lamp.json").read_text())["materials"][-1]["emission"]
+        mean = pixels.mean(axis=(0, 1)) @ (0.2126, 0.7152, 0.0722)
+        np.testing.assert_allclose(np.array(emission) * mean * 2 * math.pi, 10, rtol=1e-4)
+
+    def test_coats_of_textured_roughness_have_its_mean(self):
+        (self.folder / "grey.png").write_bytes(test_gltf.png(2, 1, [(51, 51, 51), (153, 153, 153)]))
+        scene = self.write("coat.pbrt", 'Film "rgb"\nWorldBegin\nTexture "t" "float" "imagemap" "string encoding" "linear" "float scale" .5 "string filename" "grey.png"\n'
+                           'Material "coatedconductor" "texture interface.roughness" "t" "bool remaproughness" false\nShape "sphere"')
+        done = lumicut("convert", scene, self.folder / "coat.json")
+        self.assert_ends(done, OK)
+        self.assertIn("textures of interface.roughness are their mean", done.stderr)
+        self.assertAlmostEqual(json.loads((self.folder / "coat.json").read_text())["materials"][-1]["coat_roughness"], math.sqrt(0.2), places=4)
+
+    def test_equal_disks_and_cylinders_are_one_mesh(self):
+        parts = "".join(f'AttributeBegin Translate {x} 0 0 Shape "disk" Shape "cylinder" Shape "sphere" "float zmax" .5 AttributeEnd\n' for x in range(50))
+        group = f'ObjectBegin "all" {parts} ObjectEnd AttributeBegin Translate 0 9 0 ObjectInstance "all" AttributeEnd\n'
+        scene = self.write("many.pbrt", f'Film "rgb"\nWorldBegin\n{parts}{group}Shape "disk" "float radius" 2')
+        counts = json.loads(lumicut("check", "--no-forecast", "--json", scene).stdout)["counts"]
+        self.assertEqual((counts["meshes"], counts["instances"]), (4, 301))
+
     def test_textures_of_numbers_and_of_colours_may_share_a_name(self):
         found = self.square('Texture "t" "spectrum" "constant" "rgb value" [ .3 .4 .5 ] Texture "t" "float" "constant" "float value" .25',
                             'Texture "both" "spectrum" "scale" "texture tex" "t" "texture scale" "t"', 'Material "diffuse" "texture reflectance" "both"')[0]
@@ -340,6 +396,58 @@ class Pbrt(SceneFiles):
         self.assertAlmostEqual(vertices[:, 2].min(), -0.5, delta=1e-5)
         self.assertAlmostEqual(vertices[:, 2].max(), 0.75, delta=1e-5)
 
+    def test_curves_go_where_their_splines_do(self):
+        def rings(words):
+            vertices, triangles = self.positions(f'Shape "curve" {words}')
+            self.assertEqual(len(triangles), 24 * (len(vertices) // 12 - 1))
+            rings = vertices.reshape(-1, 12, 3)
+            middles = rings.mean(axis=1)
+            return middles, np.linalg.norm(rings - middles[:, None], axis=2)
+        wider = math.pi / (12 * math.sin(math.pi / 12))
+        middles, radii = rings('"integer degree" 2 "float width0" .2 "float width1" .1 "point3 P" [ 0 0 0  1 2 0  2 0 0 ]')
+        t = middles[:, 0] / 2
+        np.testing.assert_allclose(middles[:, 1], 4 * t * (1 - t), atol=1e-5)
+        np.testing.assert_allclose(radii, np.tile((0.1 - 0.05 * t)[:, None] * wider, 12), rtol=1e-5)
+        # Chords lie within a quarter of the radius.
+        chord = np.linspace(middles[:-1], middles[1:], 9)[1:-1]
+        self.assertLess(np.abs(chord[:, :, 1] - chord[:, :, 0] * (2 - chord[:, :, 0])).max(), 0.25 * 0.1)
+        cubic, _ = rings('"float width" .01 "point3 P" [ 0 0 0  0 0 3  3 3 3  3 3 0  3 3 -3  6 0 0  6 0 3 ]')
+        np.testing.assert_allclose(cubic[[0, -1]], [(0, 0, 0), (6, 0, 3)], atol=1e-6)
+        self.assertLess(np.linalg.norm(cubic - (3, 3, 0), axis=1).min(), 1e-5)
+        # Evenly placed points of a spline are a straight line between the second and the last but one.
+        for degree, ends in ((3, (1, 4)), (2, (0.5, 4.5))):
+            line, _ = rings(f'"string basis" "bspline" "integer degree" {degree} "point3 P" [ 0 0 0 1 0 0 2 0 0 3 0 0 4 0 0 5 0 0 ]')
+            np.testing.assert_allclose(line[[0, -1], 0], ends, atol=1e-6)
+
+    def test_curves_cover_their_width(self):
+        rng = np.random.default_rng(3)
+        words, covered = ['LightSource "infinite" "rgb L" [ 1 1 1 ]', 'Material "diffuse" "rgb reflectance" [ 0 0 0 ]', "Scale .5 .5 .5"], 0
+        for x in range(8):
+            for y in range(8):
+                angle = rng.uniform(0, math.pi)
+                half = 0.2 * np.array([math.cos(angle), math.sin(angle), 0])
+                middle = np.array([x - 3.5, y - 3.5, 0]) / 2
+                points = [middle + half * k for k in (-1, -1 / 3, 1 / 3, 1)]
+                words.append(f'Shape "curve" "string type" "cylinder" "float width0" .03 "float width1" .01 "point3 P" [ {" ".join(str(c) for p in points for c in p)} ]')
+                covered += 0.02 * 0.4
+        film = HEAD.replace("48", "128").replace("36", "128") + "Scale -1 1 1 " + look((0, 0, 3), (0, 0, 0)) + 'Camera "orthographic"\nWorldBegin\n'
+        found = self.render(self.write("strands.pbrt", film + "\n".join(words)), "--vpls", 10, "--spp", 64)[0].mean()
+        # Half size, of 2 by 2. A prism of twelve sides is up to .023 narrower and .012 wider than on the average.
+        self.assertAlmostEqual((1 - found) / (covered / 16), 1, delta=0.025)
+        ribbon = ('LightSource "infinite" "rgb L" [ 1 1 1 ] Material "diffuse" "rgb reflectance" [ 0 0 0 ] Shape "curve" "string type" "ribbon" "normal N" [ {0} {0} ] '
+                  '"float width" .5 "point3 P" [ -.5 0 0 -.2 0 0 .2 0 0 .5 0 0 ]').format
+        for normal, share in (("0 0 1", 0.125), ("0 1 1", 0.125 / math.sqrt(2)), ("0 1 0", 0)):
+            found = self.render(self.write("ribbon.pbrt", film + ribbon(normal)), "--vpls", 10, "--spp", 16)[0].mean()
+            self.assertAlmostEqual(1 - found, share, delta=2e-3)
+
+    def test_much_hair_is_one_mesh(self):
+        strand = 'Shape "curve" "float width" .01 "point3 P" [ {0} 0 0  {0} 1 0  {0} 2 0  {0} 3 0 ]\n'.format
+        head = 'Film "rgb"\nWorldBegin\nMaterial "hair" "float eumelanin" {}\n'.format
+        path = self.write("hair.pbrt", head(1) + "".join(map(strand, range(12000))) + 'Material "hair" "float eumelanin" 2\n' + strand(-1))
+        self.assert_ends(lumicut("convert", path, self.folder / "hair.json"), OK)
+        scene = json.loads((self.folder / "hair.json").read_text())
+        self.assertEqual([mesh["triangles"]["count"] if isinstance(mesh["triangles"], dict) else len(mesh["triangles"]) // 3 for mesh in scene["meshes"]], [12000 * 6, 24])
+
     def test_meshes_and_scenes_may_be_packed(self):
         ply = ("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
                "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").encode()
@@ -355,9 +463,9 @@ class Pbrt(SceneFiles):
 
     def test_what_is_not_supported_is_named(self):
         _, said = self.render(self.floor('LightSource "projection"\nLightSource "point" "float shininess" 3\nMakeNamedMedium "fog" "string type" "cloud"\nMediumInterface "fog" ""\n'
-                                         'Material "measured" "string filename" "a.bsdf"\nMaterial "hair"\nShape "curve"\n'
+                                         'Material "measured" "string filename" "a.bsdf"\nShape "nurbs"\n'
                                          'Texture "t" "float" "fbm"\nMaterial "coateddiffuse" "float albedo" .5\nShape "sphere" "float wide" 1'), "--vpls", 10)
-        for text in ("lights of the kind projection: left out", "media: left out", "kind measured is diffuse", "kind hair is diffuse", "shapes of the kind curve: left out",
+        for text in ("lights of the kind projection: left out", "media: left out", "kind measured is diffuse", "shapes of the kind nurbs: left out",
                      "kind fbm is grey", '"albedo" of materials of the kind coateddiffuse: left out', '"shininess" of lights of the kind point: left out',
                      '"wide" of shapes of the kind sphere: left out'):
             self.assertIn(text, said)
@@ -376,7 +484,10 @@ class Pbrt(SceneFiles):
                               (("WorldBegin", 'WorldBegin Include "pipe.pbrt"'), ("pipe.pbrt",)), (("WorldBegin", 'WorldBegin Include "none.pbrt"'), ("none.pbrt",)),
                               (("WorldBegin", "WorldBegin AttributeEnd"), ("AttributeEnd",)), (("WorldBegin", "WorldBegin AttributeBegin"), ("no end",)),
                               (("WorldBegin", 'WorldBegin ObjectInstance "a"'), ('"a"',)), (("\"float fov\" 1", "\"float fov\" ["), ("line 4", "WorldBegin", "finite number")),
-                              (("WorldBegin", 'WorldBegin Shape "plymesh" "string filename" "no.ply"'), ("no.ply",))):
+                              (("WorldBegin", 'WorldBegin Shape "plymesh" "string filename" "no.ply"'), ("no.ply",)),
+                              (("WorldBegin", 'WorldBegin Shape "curve" "point3 P" [ 0 0 0 1 1 1 ]'), ("line 4", "6 numbers in P")),
+                              (("WorldBegin", 'WorldBegin Shape "curve" "integer degree" 7 "point3 P" [ 0 0 0 1 1 1 ]'), ("line 4", "degree 7")),
+                              (("WorldBegin", 'WorldBegin Shape "curve" "string type" "ribbon" "point3 P" [ 0 0 0 1 1 1 2 2 2 3 3 3 ]'), ("1 segments", "of N"))):
             with self.subTest(change):
                 self.assertIn(change[0], good)
                 self.assert_ends(lumicut("render", self.write("bad.pbrt", good.replace(*change)), "-o", self.folder / "x.exr"), BAD_FILE, *texts)
