@@ -1,6 +1,7 @@
 #include "clustering/light_kernel.h"
 
 #include "bsdf/point_bsdf.h"
+#include "lights/light_reach.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "clustering/light_kernel.cpp"
@@ -138,6 +139,13 @@ Rgb light_point(const Vpl& light, const Rgb& intensity, Falloff falloff, const S
   geometry *= std::max(0.0f, dot(point.normal, to_light));
   if (!(geometry > 0.0f)) return {};
   return reflectance(point, to_light) * intensity * geometry;
+}
+
+Rgb light_point_limited(const Vpl& light, const Rgb& intensity, Falloff falloff, const SurfacePoint& point) {
+  if (lights_all(light)) return light_point(light, intensity, falloff, point);
+  SurfacePoint lit = point;
+  limit(lit, light.seen_by, light.receivers);
+  return light_point(light, intensity, falloff, lit);
 }
 
 }  // namespace lumicut

@@ -87,5 +87,7 @@ inline void trace_lit(const Accel& accel, const Vpl& light, LitPoints& lit) {
 // The same for one point, in plain arithmetic: what the kernel is tested against, and for code that is not hot.
 // Spheres: one lane of the kernel.
 Rgb light_point(const Vpl& light, const Rgb& intensity, Falloff falloff, const SurfacePoint& point);
+// The same of the lobes that the light lights.
+Rgb light_point_limited(const Vpl& light, const Rgb& intensity, Falloff falloff, const SurfacePoint& point);
 
 }  // namespace lumicut

@@ -100,15 +100,17 @@ uint32_t BallQueryTree::build(std::span<const double> points, uint32_t begin, ui
 }
 
 size_t BallQueryTree::nearest(const double* p, size_t k, uint32_t* index, double* dist2, Scratch& scratch) const {
-  return search<true>(p, k, index, dist2, scratch);
+  return search<true>(p, k, index, dist2, scratch, {0, 0});
 }
 
-size_t BallQueryTree::nearest_distances(const double* p, size_t k, double* dist2, Scratch& scratch) const {
-  return search<false>(p, k, nullptr, dist2, scratch);
+size_t BallQueryTree::nearest_distances(const double* p, size_t k, double* dist2, Scratch& scratch,
+                                        Range without) const {
+  return search<false>(p, k, nullptr, dist2, scratch, without);
 }
 
 template <bool kTies>
-size_t BallQueryTree::search(const double* p, size_t k, uint32_t* index, double* dist2, Scratch& scratch) const {
+size_t BallQueryTree::search(const double* p, size_t k, uint32_t* index, double* dist2, Scratch& scratch,
+                             [[maybe_unused]] Range without) const {
   k = std::min(k, size());
   if (k == 0) return 0;
   const auto d = static_cast<size_t>(dim_);
@@ -164,8 +166,11 @@ size_t BallQueryTree::search(const double* p, size_t k, uint32_t* index, double*
     const uint32_t* ids = &ids_[nodes_[n].bucket * kBucket];
     for (uint32_t i = 0; i < kBucket; ++i) {
       if (!within(sum[i], worst) || ids[i] == 0xffffffffu) continue;
-      if constexpr (kTies)
+      if constexpr (kTies) {
         if (count == k && sum[i] == worst && ids[i] > index[k - 1]) continue;
+      } else if (ids[i] - without.first < without.count) {
+        continue;
+      }
       // Insertion into the sorted list: k is small.
       size_t at = count < k ? count++ : k - 1;
       for (; at > 0; --at) {

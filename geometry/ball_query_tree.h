@@ -27,13 +27,19 @@ class BallQueryTree {
   // The k nearest points to `point` (`dimension` numbers), nearest first, the smaller index on ties: their indices and
   // squared distances. Returns how many, the lesser of k and size().
   size_t nearest(const double* point, size_t k, uint32_t* index, double* dist2, Scratch& scratch) const;
-  // Their squared distances alone: quick even where all points are at one place.
-  size_t nearest_distances(const double* point, size_t k, double* dist2, Scratch& scratch) const;
+  // A range of indices.
+  struct Range {
+    uint32_t first, count;
+  };
+  // Their squared distances alone: quick even where all points are at one place. Those of `without` are left out, so that
+  // there may be fewer than k.
+  size_t nearest_distances(const double* point, size_t k, double* dist2, Scratch& scratch,
+                           Range without = {0, 0}) const;
 
  private:
   // kTies: among points at one distance the smaller index wins.
   template <bool kTies>
-  size_t search(const double* point, size_t k, uint32_t* index, double* dist2, Scratch& scratch) const;
+  size_t search(const double* point, size_t k, uint32_t* index, double* dist2, Scratch& scratch, Range without) const;
   static constexpr uint32_t kBucket = 16;
   struct Node {
     double radius;

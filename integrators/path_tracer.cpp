@@ -81,7 +81,6 @@ class PathTracer final : public Integrator {
     float travelled = 0.0f;       // on that way, since `point`
     uint32_t kind = kDiffuseRay;  // of its ray
     Rgb absorption{};             // on its way, for each unit of length
-    uint32_t not_lit_by = 0;      // specular: sets of receivers that the surface it left is not in
   };
   struct Shadow {
     Rgb light;
@@ -139,13 +138,13 @@ class PathTracer final : public Integrator {
       const size_t i = delta_.sample(path.rng.next_float());
       const Vpl& light = sampler_->delta_lights()[i];
       add_shadow(path, light, 0.0f,
-                 light_point(light, light.intensity / static_cast<float>(delta_.pmf(i)), Falloff(scene_->profiles()),
-                             limited(path.point, light)),
+                 light_point_limited(light, light.intensity / static_cast<float>(delta_.pmf(i)),
+                                     Falloff(scene_->profiles()), path.point),
                  rays, shadows);
     }
     if (!sampler_->has_extended() && !sampler_->has_environment()) return;
     const DirectSample s = sampler_->sample_light(path.rng);
-    Rgb light = light_point(s.vpl, s.vpl.intensity, Falloff(scene_->profiles()), limited(path.point, s.vpl));
+    Rgb light = light_point_limited(s.vpl, s.vpl.intensity, Falloff(scene_->profiles()), path.point);
     if (!(max_component(light) > 0.0f)) return;
     if (s.seen_by_rays) {
       const bool far = s.vpl.kind == VplKind::directional;
@@ -158,8 +157,8 @@ class PathTracer final : public Integrator {
     add_shadow(path, s.vpl, s.offset, light, rays, shadows);
   }
 
-  void add_shadow(const Path& path, const Vpl& light, float offset, const Rgb& value, std::vector<Ray>& rays,
-                  std::vector<Shadow>& shadows) const {
+  [[gnu::always_inline]] void add_shadow(const Path& path, const Vpl& light, float offset, const Rgb& value,
+                                         std::vector<Ray>& rays, std::vector<Shadow>& shadows) const {
     if (!(max_component(value) > 0.0f) || !is_finite(value)) return;
     Ray ray;
     ray.org = path.point.position, ray.mask = light.ray_mask;
@@ -181,7 +180,7 @@ class PathTracer final : public Integrator {
     if (!light_surfaces_->empty())
       light_surfaces_->for_each_hit(hit.ray.org, path.direction, hit.ray.tfar, [&](const LightSurfaces::Hit& seen) {
         const LightReach& reach = scene_->lights()[seen.light].reach;
-        const bool shown = reach.lights(path.kind) && in_set(path.not_lit_by, reach.receivers);
+        const bool shown = reach.lights(path.kind) && in_set(path.point.not_lit_by, reach.receivers);
         if (path.specular ? !shown : !seen.by_rays) return;
         const double distance = double{path.travelled} + seen.t;
         const double density = sampler_->light_density(seen.light) * distance * distance / seen.cosine;
@@ -223,7 +222,8 @@ class PathTracer final : public Integrator {
     if (choice.specular) {
       path.origin = at.bsdf.origin(choice.specular->flags), path.direction = choice.specular->direction;
       path.kind = ray_kind(choice.specular->flags, path.kind);
-      if (!path.straight) path.not_lit_by = at.bsdf.not_lit_by();
+      // Of the surface that it leaves; nothing else is asked of the point again.
+      if (!path.straight) path.point.not_lit_by = at.bsdf.not_lit_by();
       path.absorption = at.bsdf.absorption_after(choice.specular->flags, path.absorption);
       path.weight = path.weight * choice.specular->weight / choice.probability;
       return survives(path, depth, path.weight, path.weight);

@@ -14,9 +14,5 @@ inline void limit(SurfacePoint& point, uint32_t seen_by, uint32_t receivers) {
   if (!lit || (seen_by & kDiffuseRay) == 0) point.diffuse = {};
   if (!lit || (seen_by & kGlossyRay) == 0) point.specular = {}, point.grazing = {};
 }
-inline SurfacePoint limited(SurfacePoint point, const Vpl& v) {
-  if (!lights_all(v)) limit(point, v.seen_by, v.receivers);
-  return point;
-}
 
 }  // namespace lumicut

@@ -34,7 +34,7 @@ void LightSampler::add_lights(std::vector<double>& weights, const Progress* prog
   for (const bool extended : {false, true}) {
     if (extended) {
       const double power = environment_power(progress);
-      if (power > 0.0) sampler_.push_back({Kind::environment, 0, 0, 0}), weights.push_back(power);
+      if (power > 0.0) sampler_.push_back({Kind::environment, 0, 0, 0, false}), weights.push_back(power);
       environment_share_ = power;  // until the others' power is known
       extended_ = sampler_.size();
     }
@@ -42,7 +42,7 @@ void LightSampler::add_lights(std::vector<double>& weights, const Progress* prog
     const auto add = [&](Kind kind, uint32_t light, double power, bool extent) {
       added = power > 0.0 && extent == extended;
       if (!added) return;
-      sampler_.push_back({kind, light, 0, 0});
+      sampler_.push_back({kind, light, 0, 0, false});
       weights.push_back(power);
     };
     for (uint32_t i = 0; i < scene_.lights().size(); ++i) {
@@ -187,7 +187,7 @@ void LightSampler::add_triangles(std::vector<double>& weights, const Progress* p
         const double power = std::numbers::pi * area * emission * (material.emit_both_sides ? 2 : 1);
         if (!(power > 0.0)) continue;
         has_meshes_ = true;
-        sampler_.push_back({Kind::triangle, m, i, t});
+        sampler_.push_back({Kind::triangle, m, i, t, false});
         weights.push_back(power);
       }
     }
@@ -264,6 +264,7 @@ LightSampler::LightSampler(const Scene& scene, const Progress* progress) : scene
   std::vector<double> weights;
   add_lights(weights, progress);
   add_triangles(weights, progress);
+  for (Emitter& e : std::span(sampler_).subspan(extended_)) e.found_by_rays = is_found_by_rays(e);
   power_ = DiscreteDistribution(weights);
   const double with_extent = has_extended() ? power_.sum(extended_, sampler_.size()) : 0.0;
   if (environment_share_ > 0.0) environment_share_ /= environment_share_ + with_extent;
@@ -286,7 +287,7 @@ MeshLight mesh_light(const Mesh& mesh) {
   return (mesh.mask & kByRays) == kByRays ? MeshLight::by_samples_and_rays : MeshLight::by_samples;
 }
 
-bool LightSampler::found_by_rays(const Emitter& e) const {
+bool LightSampler::is_found_by_rays(const Emitter& e) const {
   if (e.kind == Kind::triangle) return mesh_light(scene_.meshes()[e.index]) == MeshLight::by_samples_and_rays;
   return e.kind != Kind::sphere && e.kind != Kind::soft && e.kind != Kind::sun &&
          !scene_.lights()[e.index].reach.limited();

@@ -103,7 +103,7 @@ class LightSampler {
   DirectSample sample_light(Rng& rng) const;
   // Whether rays that leave a point that lights are sampled at may find extended emitter i. Spheres and suns are not there
   // for rays.
-  bool found_by_rays(size_t i) const { return found_by_rays(sampler_[extended_ + i]); }
+  bool found_by_rays(size_t i) const { return sampler_[extended_ + i].found_by_rays; }
   // Density with which sample_light draws a place on an emissive mesh, on a rectangle or disk, for each unit of area, and
   // a direction towards the environment, for each steradian.
   double mesh_density(const SurfaceHit& surface) const;
@@ -120,6 +120,7 @@ class LightSampler {
     uint32_t index;     // light, or mesh
     uint32_t instance;  // triangle
     uint32_t triangle;
+    bool found_by_rays = false;  // of those with extent
   };
   struct Surface {  // a sampled point of an emitting surface
     Vec3f position, normal;
@@ -134,7 +135,7 @@ class LightSampler {
   void add_programmed(uint32_t material, const Progress* progress);
   // Luminance of what a triangle of an emissive material emits, in the mean over it.
   double mean_emission(const Material& material, uint32_t mesh, uint32_t triangle, uint32_t instance) const;
-  bool found_by_rays(const Emitter& e) const;
+  bool is_found_by_rays(const Emitter& e) const;
   Surface sample_surface(const Emitter& e, Rng& rng) const;
   // A sample of an emitter with extent as a virtual light that stands for `weight` of it; a sun's has no area_pdf: 0.
   struct ExtendedSample {

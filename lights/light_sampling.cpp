@@ -220,7 +220,7 @@ DirectSample LightSampler::sample_light(Rng& rng) const {
   const auto weight = static_cast<float>(1.0 / share);
   const ExtendedSample extended = extended_light(e, weight, rng);
   s.vpl = extended.vpl, s.offset = extended.offset;
-  s.seen_by_rays = found_by_rays(e), s.density = share * extended.area_pdf;
+  s.seen_by_rays = e.found_by_rays, s.density = share * extended.area_pdf;
   return s;
 }
 

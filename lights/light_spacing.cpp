@@ -42,20 +42,12 @@ float LightSpacing::of_light(size_t i, size_t beside, BallQueryTree::Scratch& sc
   const size_t count = tree_.size(), first = i - std::min(i, beside), last = std::min(count, i + beside + 1);
   const size_t others = count - (last - first), wanted = std::min(kNeighbour, others);
   if (wanted == 0) return lonely_;
-  std::vector<uint32_t> index;
-  std::vector<double> dist2;
-  for (size_t ask = 2 * kNeighbour;; ask *= 2) {
-    index.resize(ask), dist2.resize(ask);
-    const size_t found = tree_.nearest(place, ask, index.data(), dist2.data(), scratch);
-    size_t left = wanted;
-    for (size_t k = 0; k < found; ++k) {
-      if (index[k] >= first && index[k] < last) continue;
-      if (--left > 0) continue;
-      const double share = static_cast<double>(others) / static_cast<double>(count);
-      return static_cast<float>(
-          std::sqrt(dist2[k] * share * static_cast<double>(kNeighbour) / static_cast<double>(wanted)));
-    }
-  }
+  std::array<double, kNeighbour> dist2;
+  const BallQueryTree::Range without{static_cast<uint32_t>(first), static_cast<uint32_t>(last - first)};
+  tree_.nearest_distances(place, wanted, dist2.data(), scratch, without);
+  const double share = static_cast<double>(others) / static_cast<double>(count);
+  return static_cast<float>(
+      std::sqrt(dist2[wanted - 1] * share * static_cast<double>(kNeighbour) / static_cast<double>(wanted)));
 }
 
 }  // namespace lumicut

@@ -33,8 +33,8 @@ uint64_t render_bytes(const Rect& crop, const IterationOptions& options, size_t 
   const uint64_t film = film_pixel_bytes(groups, denoise), mean = IterationMean::pixel_bytes(denoise),
                  state = film + mean;
   uint64_t bytes = film;
-  // The iteration beside the mean; a list in which the image's error is looked up.
-  if (options.progressive()) bytes += film + mean + sizeof(double);
+  // The iteration beside the mean; a list in which the image's error is looked up; how many rays compensate a pixel.
+  if (options.progressive()) bytes += film + mean + sizeof(double) + sizeof(uint8_t);
   // One is made, one is the last, one is what a host looks at. Or the one that the render goes on from.
   bytes += state * (options.checkpoints ? 3 : options.resume.empty() ? 0 : 1);
   // At the end, when no checkpoint is being made and the last iteration's film is gone.

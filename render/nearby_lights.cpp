@@ -48,7 +48,7 @@ void NearbyLights::trace(const ShadePoints& points, const Options& options, cons
       const auto s =
           near_.sample(point.position, std::min(choice, 0x1.fffffep-1f), u - std::floor(u), v - std::floor(v));
       if (!s) continue;
-      Rgb light = light_point(s->vpl, s->vpl.intensity * (1.0f / kSamples), {}, limited(point, s->vpl));
+      Rgb light = light_point_limited(s->vpl, s->vpl.intensity * (1.0f / kSamples), {}, point);
       if (!(max_component(light) > 0.0f) || !is_finite(light)) continue;
       const Vec3f to_light = s->vpl.position - point.position;
       if (options.rays && s->found_by_rays)

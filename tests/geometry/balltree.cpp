@@ -245,6 +245,12 @@ TEST(BallQueryTree, NearestEqualsBruteForce) {
             ASSERT_EQ(dist2[j], order[j].first);
             ASSERT_EQ(index[j], order[j].second);
           }
+          // Distances alone, of all but a range of points.
+          const BallQueryTree::Range without{static_cast<uint32_t>(n / 3), static_cast<uint32_t>(n / 2)};
+          std::erase_if(order, [&](const auto& p) { return p.second >= n / 3 && p.second < n / 3 + n / 2; });
+          const size_t left = t.nearest_distances(&q.centres[i * dim], k, dist2, scratch, without);
+          ASSERT_EQ(left, std::min(k, order.size()));
+          for (size_t j = 0; j < left; ++j) ASSERT_EQ(dist2[j], order[j].first);
         }
       }
 }
