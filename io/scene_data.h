@@ -55,6 +55,7 @@ struct Mesh {
   uint32_t mask = 0;  // as in lumicut_mesh, and so
   uint32_t not_lit_by = 0, not_blocking = 0, receivers = 0, blockers = 0;
   std::vector<Attribute> attributes;
+  bool shadow_catcher = false;  // for `lumicut render`, which makes several scenes of it
 };
 
 // Intensity of a light by direction, as lumicut_profile has it.
@@ -71,6 +72,7 @@ struct SceneData {
   std::vector<Profile> profiles;
   std::vector<lumicut_light> lights;     // profile numbers are 1 + index into `profiles`
   std::vector<std::string> light_names;  // where each stands in the file: "lights[3]"
+  std::set<size_t> lights_of_catchers;   // those that shine on shadow catchers where these are alone
   std::optional<lumicut_environment> environment;
   lumicut_camera camera{};
   uint32_t width = 512, height = 512, samples = 1;  // what the scene file proposes

@@ -77,6 +77,14 @@ class SceneReader {
     if (environment) read_environment(*environment);
     if (meshes)
       for (const auto& mesh : meshes->elements()) read_mesh(mesh);
+    if (!scene_.environment && scene_.lights_of_catchers.empty())
+      for (const Mesh& mesh : scene_.meshes)
+        if (mesh.shadow_catcher)
+          scene_.warnings.add(
+              "shadow catchers that nothing lights", path_,
+              fmt::format("{}: a shadow catcher shows no shadow where no light has \"shadow_catcher\" and there "
+                          "is no environment",
+                          mesh.name));
     std::move(visible_lights_.begin(), visible_lights_.end(), std::back_inserter(scene_.meshes));
     if (scene_.meshes.empty()) root.value().fail("has neither meshes nor visible lights: there is nothing to see");
     check_lit();
@@ -490,6 +498,7 @@ class SceneReader {
                    not_blocking = sets(object, "not_blocking", kBlockerSets),
                    receivers = set_of(object, "receivers", kReceiverSets),
                    blockers = set_of(object, "blockers", kBlockerSets);
+    const bool catcher = object.boolean("shadow_catcher", false);
     const auto attributes = object.find("attributes");
     const size_t first = scene_.meshes.size();
     if (object.has("obj")) {
@@ -514,6 +523,7 @@ class SceneReader {
       mesh.mask = mask;
       mesh.not_lit_by = not_lit_by, mesh.not_blocking = not_blocking;
       mesh.receivers = receivers, mesh.blockers = blockers;
+      mesh.shadow_catcher = catcher;
       mesh.transforms = kept;
       place(value, mesh, placed);
     }
@@ -763,6 +773,10 @@ class SceneReader {
     light.value = static_cast<float>(object.need("value").number(0, 1e20));
     if (!object.boolean("shadows", true)) light.flags |= LUMICUT_NO_SHADOWS;
     read_reach(object, light);
+    if (const auto catcher = object.find("shadow_catcher"); catcher && catcher->boolean()) {
+      if (object.boolean("visible", false)) catcher->fail("is not for a visible light, which is a mesh");
+      scene_.lights_of_catchers.insert(scene_.lights.size());
+    }
     if (light.type == LUMICUT_SUN) {
       store(light.direction, direction(object.need("direction")));
       light.radius = static_cast<float>(radians(object.number("angular_radius", 0, 0, 90)));

@@ -148,6 +148,7 @@ class Writer {
       for (Json& m : out["meshes"]) name_file(m, file);
     }
     for (const lumicut_light& l : scene_.lights) out["lights"].push_back(light(l));
+    for (const size_t l : scene_.lights_of_catchers) out["lights"][l]["shadow_catcher"] = true;
     if (scene_.environment) out["environment"] = environment(*scene_.environment);
     return out;
   }
@@ -202,6 +203,7 @@ class Writer {
     sets("not_lit_by", mesh.not_lit_by), sets("not_blocking", mesh.not_blocking);
     if (mesh.receivers != 0) out["receivers"] = mesh.receivers;
     if (mesh.blockers != 0) out["blockers"] = mesh.blockers;
+    if (mesh.shadow_catcher) out["shadow_catcher"] = true;
     for (const Attribute& a : mesh.attributes) {
       constexpr const char* kDomains[] = {"vertices", "triangles", "instances"};
       Json attribute{{"name", attribute_name(a.id)}, {"domain", kDomains[a.domain]}, {"components", a.components}};

@@ -112,7 +112,8 @@ class ErrorsCommand {
           fmt::format("errors: {} has no virtual lights; what is taken apart is the error of methods that have them",
                       o_.integrator));
     bar_.show("reading files", 0, 0);
-    const io::SceneData data = read_scene_file(o_.scene);
+    io::SceneData data = read_scene_file(o_.scene);
+    warn_of_catchers(data, "errors");
     bar_.wipe();
     tell_warnings(data.warnings, o_.scene, o_.strict);
     stop_if_interrupted();

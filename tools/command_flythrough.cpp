@@ -123,7 +123,8 @@ class FlythroughCommand {
     for (const auto& path : {o_.output, o_.png, o_.stats, o_.save_state})
       if (!path.empty()) io::check_writable(path);
     create();
-    const io::SceneData data = read_scene_file(o_.scene);
+    io::SceneData data = read_scene_file(o_.scene);
+    warn_of_catchers(data, "flythrough");
     tell_warnings(data.warnings, o_.scene, o_.strict);
     const auto cameras = read_cameras(o_.cameras, data.camera);
     io::upload_scene(api(), scene_.get(), data);

@@ -24,6 +24,7 @@
 #include "tools/preflight.h"
 #include "tools/progress_bar.h"
 #include "tools/render_setup.h"
+#include "tools/shadow_catcher.h"
 
 namespace lumicut::tools {
 
@@ -112,6 +113,7 @@ class RenderCommand {
     tell();
     check_memory(channels);
     render();
+    catch_shadows();
     write(channels);
     if (checkpoint_error_) throw *checkpoint_error_;  // the last state is not on the disk
   }
@@ -216,8 +218,78 @@ class RenderCommand {
     if (!o_.checkpoint.empty())
       check_room_for_checkpoint(api(), o_.checkpoint, pixel_count(), o_.groups ? data.light_groups().size() : 0,
                                 (desc_.flags & LUMICUT_DENOISE) != 0);
+    prepare_catchers(data);
     read_seconds_ = now() - start;
     if (o_.verbosity >= 2) told_ = std::make_unique<io::SceneData>(std::move(data));
+  }
+
+  // Scenes beside the whole one [shadow_catcher.h]. Takes `data`, unless it is to be told of.
+  void prepare_catchers(io::SceneData& data) {
+    if (!has_catchers(data)) return;
+    const auto refuse = [&](bool given, const char* option) {
+      if (given)
+        throw UsageError(fmt::format("{}: not with shadow catchers, which take several scenes: {}", option, o_.scene));
+    };
+    refuse(o_.squares > 0, "--squares"), refuse(!o_.vpl_in.empty(), "--vpl-in");
+    io::SceneData of_beside = o_.verbosity >= 2 ? data : std::move(data);
+    const auto add = [&] {
+      beside_.emplace_back(api());
+      create_scene(api(), o_, device_.get(), beside_.back());
+      io::upload_scene(api(), beside_.back().get(), of_beside);
+    };
+    const bool shows_world = of_beside.environment && (of_beside.environment->flags & LUMICUT_HIDDEN) == 0;
+    const auto environment = of_beside.environment;
+    leave_objects(of_beside), add();
+    of_beside.environment = environment;
+    leave_catchers(of_beside), add();
+    if (shows_world) leave_world(of_beside), add();
+  }
+
+  // Frames of those, of as many passes as the whole one has.
+  void catch_shadows() {
+    if (beside_.empty()) return;
+    lumicut_status status{};
+    status.struct_size = sizeof(status);
+    io::check(api(), api().get_status(parts_[0].second.get(), &status), "render");
+    lumicut_render_desc desc = desc_;
+    desc.passes = std::max(1u, status.passes_done);
+    desc.max_seconds = desc.target_error = 0;
+    desc.checkpoint = nullptr, desc.checkpoint_size = 0;
+    desc.flags &= LUMICUT_DENOISE | LUMICUT_KEEP_FIREFLIES;
+    std::vector<Caught> frames;
+    for (const auto& scene : beside_) {
+      commit_scene(api(), watcher_, scene.get(), o_.scene);
+      io::Handle<lumicut_integrator> integrator(api());
+      create_integrator(integrator);
+      io::Handle<lumicut_render> render(api());
+      io::check(api(), api().render_start(integrator.get(), scene.get(), &desc, render.out()), "render of shadows");
+      watcher_.watch(render.get());
+      lumicut_result result;
+      do {
+        status.struct_size = sizeof(status);
+        result = api().render_wait(render.get(), 100, &status);
+        if (result == LUMICUT_OK)
+          bar_.show(fmt::format("shadows {}/{}", frames.size() + 1, beside_.size()), status.fraction, status.seconds);
+      } while (result == LUMICUT_OK && (status.state == LUMICUT_RUNNING || status.state == LUMICUT_IDLE));
+      watcher_.watch(nullptr);
+      stop_if_interrupted();
+      io::check(api(), result, "render of shadows");
+      frames.push_back(read_caught(render.get()));
+    }
+    caught_ = read_caught(parts_[0].second.get());
+    lay_shadows(frames, *caught_);
+    bar_.wipe();
+  }
+
+  Caught read_caught(lumicut_render render) const {
+    const auto read = [&](const char* channel, size_t components) {
+      std::vector<float> pixels(components * pixel_count());
+      io::check(api(), api().render_read(render, channel, nullptr, pixels.data()), channel);
+      return pixels;
+    };
+    Caught out{read("radiance", 3), read("alpha", 1), {}};
+    if ((desc_.flags & LUMICUT_DENOISE) != 0) out.denoised = read("denoised", 3);
+    return out;
   }
 
   uint64_t pixel_count() const {
@@ -405,6 +477,10 @@ class RenderCommand {
     const auto read = [&](const Channel& channel) {
       const auto components = static_cast<size_t>(channel.components);
       io::ImageLayer layer{channel.name, channel.components, {}};
+      if (caught_ && channel.name == "radiance") layer.pixels = caught_->radiance;
+      if (caught_ && channel.name == "alpha") layer.pixels = caught_->alpha;
+      if (caught_ && channel.name == "denoised") layer.pixels = caught_->denoised;
+      if (!layer.pixels.empty()) return layer;
       layer.pixels.assign(size_t{width} * height * components, std::numeric_limits<float>::quiet_NaN());
       std::vector<float> rows;
       for (const auto& [rect, render] : parts_) {
@@ -492,6 +568,8 @@ class RenderCommand {
   io::Handle<lumicut_scene> scene_{library_.api()};
   io::Handle<lumicut_integrator> integrator_{library_.api()};
   std::vector<std::pair<lumicut_tile, io::Handle<lumicut_render>>> parts_;
+  std::vector<io::Handle<lumicut_scene>> beside_;  // that shadow catchers need
+  std::optional<Caught> caught_;
   InterruptWatcher watcher_;             // ends before the handles that it may cancel
   api::VplSet lights_;                   // of --vpl-in
   std::unique_ptr<io::SceneData> told_;  // at high verbosity, until it is told of

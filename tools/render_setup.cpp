@@ -88,6 +88,14 @@ io::SceneData read_scene_file(const std::string& path) {
   return io::read_scene_file(path);
 }
 
+void warn_of_catchers(io::SceneData& data, const std::string& command) {
+  for (const io::Mesh& mesh : data.meshes)
+    if (mesh.shadow_catcher)
+      data.warnings.add(
+          "shadow catchers", data.file,
+          fmt::format("{}: a shadow catcher, which is an ordinary object to `lumicut {}`", mesh.name, command));
+}
+
 void tell_warnings(const io::Warnings& warnings, const std::string& file, bool strict) {
   for (const auto& warning : warnings.lines()) print_error("lumicut: warning: {}\n", warning);
   if (strict && !warnings.empty()) throw io::FileError(file, "has warnings, which --strict takes as errors");

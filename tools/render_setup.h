@@ -54,6 +54,9 @@ void apply_preset(const io::Api& api, FrameSetup& setup, bool plain);
 // io::read_scene_file, which Ctrl-C ends at once.
 io::SceneData read_scene_file(const std::string& path);
 
+// Where shadow catchers are ordinary objects to this command: a warning.
+void warn_of_catchers(io::SceneData& data, const std::string& command);
+
 // Prints on standard error what was noticed while the scene of that file was read; throws FileError when `strict` and
 // there is anything.
 void tell_warnings(const io::Warnings& warnings, const std::string& file, bool strict);

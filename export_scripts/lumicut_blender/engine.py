@@ -127,9 +127,6 @@ class LumicutEngine(bpy.types.RenderEngine):
                 report.note(f"{factor:g}", "Film exposure, which scene files do not have")
             if data.backdrop is not None:
                 report.note(scene.world.name, "Worlds that the camera sees otherwise, black in scene files' images")
-            for mesh in data.meshes:
-                if mesh.catcher:
-                    report.note(mesh.name, "Shadow catchers, ordinary objects in scene files")
             if len(views) > 1:
                 report.note(views[0][0], "Of several views the first alone is exported")
         tracing = properties.tracing_of(settings)

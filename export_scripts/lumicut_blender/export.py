@@ -15,7 +15,7 @@ import zlib
 
 import numpy as np
 
-from . import cameras, properties
+from . import cameras, properties, shadow_catcher
 from .lumicut import library
 from .scene_data import Program
 
@@ -363,6 +363,10 @@ class Writer:
                "camera": self.camera(self.data.camera),
                "materials": [self.material(n, m) for n, (_, m) in zip(names, self.data.materials)],
                "lights": [self.light(light) for _, light in self.data.lights], "meshes": []}
+        if shadow_catcher.is_needed(self.data):
+            for (name, _), light in zip(self.data.lights, out["lights"]):
+                if name not in self.data.added_lamps:
+                    light["shadow_catcher"] = True
         programs = [self.program(1 + i, p) for i, p in enumerate(self.data.images) if isinstance(p, Program)]
         if programs:
             out["programs"] = programs
@@ -378,6 +382,7 @@ class Writer:
                                   **self.attributes(mesh, file),
                                   **({"group": mesh.group} if mesh.group else {}),
                                   **({"hidden_from": hidden_from(mesh.mask)} if mesh.mask else {}),
+                                  **({"shadow_catcher": True} if mesh.catcher else {}),
                                   **links(mesh.links)})
         if not out["meshes"]:
             raise ExportError("the scene has no mesh to export")

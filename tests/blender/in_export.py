@@ -167,6 +167,24 @@ class Export(unittest.TestCase):
         h.set_lumicut("lightcuts", 1, vpls=3000, error=0.01)
         self.compare()
 
+    @unittest.skipUnless(COMMAND.exists(), f"{COMMAND} is not built")
+    def test_shadow_catchers_are_what_f12_shows(self):
+        scene = h.new_scene(40, 40)
+        h.set_world((0.5, 0.4, 0.3))
+        ground = h.add_plane(8, material=h.diffuse((0.8, 0.6, 0.3)))
+        ground.is_shadow_catcher = True
+        h.add_sphere(0.6, (0.2, 0.1, 1), h.diffuse((0.8, 0.2, 0.1)), segments=48)
+        h.add_light("SUN", energy=4, rotation=(0.6, 0.5, 0), angle=0.1).is_shadow_catcher = True
+        h.add_light("POINT", location=(-2, -1, 2), energy=100).is_shadow_catcher = False  # new lamps are
+        h.set_lumicut("exhaustive", 2, passes=2, vpls=500)
+        for transparent in (True, False):
+            with self.subTest(transparent=transparent):
+                scene.render.film_transparent = transparent
+                self.compare()
+                self.assertFalse([note for note in h.last_notes() if "catcher" in note])
+                described = json.loads(self.path.read_text())
+                self.assertEqual([light.get("shadow_catcher", False) for light in described["lights"]], [True, False])
+
     def test_modifiers_have_render_levels_and_the_engine_comes_back(self):
         scene = rich_scene()
         scene.render.engine = "CYCLES"

@@ -167,6 +167,36 @@ TEST(SceneJson, LightsAreLinkedToMeshes) {
   expect_in(error([](json& s) { s["meshes"][0]["not_blocking"] = {28}; }), {"meshes[0].not_blocking[0]", "28"});
 }
 
+TEST(SceneJson, ShadowCatchersAndTheLightsThatAreOfThem) {
+  const auto point = [](bool catcher) {
+    return json{{"type", "point"}, {"position", {0, 1, 0}}, {"value", 1}, {"shadow_catcher", catcher}};
+  };
+  const SceneData data = changed([&](json& s) {
+    s["lights"] = {point(false), point(true)};
+    s["meshes"][0]["shadow_catcher"] = true;
+  });
+  EXPECT_TRUE(data.meshes[0].shadow_catcher);
+  EXPECT_EQ(data.lights_of_catchers, std::set<size_t>{1});
+  EXPECT_TRUE(data.warnings.empty());
+  const SceneData alone = changed([&](json& s) {
+    s["lights"] = {point(false)};
+    s["meshes"][0]["shadow_catcher"] = true;
+  });
+  ASSERT_EQ(alone.warnings.lines().size(), 1u);
+  EXPECT_NE(alone.warnings.lines()[0].find("no light has \"shadow_catcher\""), std::string::npos);
+  expect_in(error([](json& s) {
+              s["lights"] = {{{"type", "rectangle"},
+                              {"position", {0, 1, 0}},
+                              {"u", {1, 0, 0}},
+                              {"v", {0, 1, 0}},
+                              {"value", 1},
+                              {"visible", true},
+                              {"shadow_catcher", true}}};
+            }),
+            {"lights[0].shadow_catcher", "is not for a visible light"});
+  expect_in(error([](json& s) { s["meshes"][0]["shadow_catcher"] = 1; }), {"meshes[0].shadow_catcher"});
+}
+
 TEST(SceneJson, UnitScaleTurnsLengthsIntoMetresAndNothingElse) {
   const SceneData scene = changed([](json& s) {
     s["unit_scale"] = 0.01;

@@ -55,7 +55,7 @@ def json_scene(path):
                       {"name": "glass", "model": "ggx", "transmission": 1, "shadows_pass": True, "ior": 1.45, "absorption": [0.1, 0.2, 0.3],
                        "specular_tint": [1, 0.9, 0.8]},
                       {"name": "cloth", "model": "ggx", "burley": True, "translucency": [0.1, 0.2, 0.1], "coat": 0.5, "coat_roughness": 0.2}],
-        "meshes": [{"positions": square, "quads": [[0, 1, 2, 3]], "material": "a", "transform": {"scale": 3},
+        "meshes": [{"positions": square, "quads": [[0, 1, 2, 3]], "material": "a", "transform": {"scale": 3}, "shadow_catcher": True,
                     "attributes": [{"name": "colour", "domain": "vertices", "components": 3, "values": [1, .5, .2, .3, 1, 1, .2, .2, 1, 1, 1, 1]}]},
                    {"positions": square, "quads": [[0, 1, 2, 3]], "material": "a 2", "hidden_from": ["camera", "glossy"], "group": 3,
                     "normals": [[0.1, 0.2, 0.9], [0, 0, 1], [0.3, 0, 1], [0, 0.1, 1]],
@@ -65,7 +65,7 @@ def json_scene(path):
         "lights": [{"type": "point", "position": [0, 0, 3], "direction": [0.1, 0.2, -0.9], "ies": "lamp.ies", "value": 0.7, "rotation": 20},
                    {"type": "spot", "position": [1, 1, 3], "direction": [0.3, 0.123, -0.77], "ies": "lamp.ies", "value": 0.7, "angle": 50},
                    {"type": "spot", "position": [1, 1, 3], "direction": [0.3, 0.123, -0.77], "value": 3, "unit": "watt", "angle": 50, "blend": 0.3,
-                    "cosine": True, "radius": 0.01, "group": 2},
+                    "cosine": True, "radius": 0.01, "group": 2, "shadow_catcher": True},
                    {"type": "rectangle", "position": [-2, 0, 2], "u": [1, 0, 0.1], "v": [0, 1, 0], "value": 2, "spread": 120},
                    {"type": "disk", "position": [2, 0, 2], "u": [0, 1, 0.1], "v": [1, 0, 0], "value": 2, "visible": True}],
         "environment": {"sky": {"sun_elevation": 33, "sun_rotation": 77}, "strength": 0.01}}))

@@ -1,0 +1,83 @@
+"""Shadow catchers of scene files: what the camera sees of them, against arithmetic; in Blender tests/blender/in_export.py holds
+them against F12, and in_catchers.py that against Cycles."""
+import json
+import unittest
+
+import cli
+from cli import BAD_FILE, OK, USAGE, lumicut
+from test_models import oiio
+
+
+def square(half, height, material, **more):
+    corners = [[-half, height, half], [half, height, half], [half, height, -half], [-half, height, -half]]
+    return {"positions": corners, "quads": [[0, 1, 2, 3]], "material": material, **more}
+
+
+class Catchers(cli.Cli):
+    """A square above a floor that a sun shines on from above: its shadow is 2 wide, the floor 4, the image 8."""
+
+    def render(self, *words, code=OK, lit=0.5, sun=True, **environment):
+        scene = {"image": {"size": [16, 16], "samples": 4},
+                 "camera": {"type": "orthographic", "eye": [0, 10, 0], "at": [0, 0, 0], "up": [0, 0, -1], "height": 8},
+                 "materials": [{"name": "floor", "diffuse": [0.5, 0.25, 0.125]}, {"name": "roof", "diffuse": [0, 0, 0]}],
+                 "lights": [{"type": "sun", "direction": [0, -1, 0], "value": 2, "shadow_catcher": sun},
+                            {"type": "sun", "direction": [0, -1, 0], "value": 1, "color": [lit, lit, lit]}],
+                 "meshes": [square(2, 0, "floor", shadow_catcher=True), square(1, 1, "roof", hidden_from=["camera"])]}
+        if environment:
+            scene["environment"] = environment
+        path, out = self.folder / "scene.json", self.folder / "out.exr"
+        path.write_text(json.dumps(scene))
+        result = lumicut("render", path, "-i", "exhaustive", "-p", "max_depth=0", "--layers", "radiance,alpha", "-o", out, *words)
+        self.assert_ends(result, code)
+        if code != OK:
+            return result.stderr
+        opened = oiio.ImageInput.open(str(out))
+        pixels, names = opened.read_image("float"), [name.split(".")[-1] for name in opened.spec().channelnames]
+        self.assertEqual(len(names), 4)
+        return pixels[..., [*map(names.index, "RGB"), ({*range(4)} - {*map(names.index, "RGB")}).pop()]]
+
+    def test_shadows_are_alpha_and_the_rest_is_clear(self):
+        pixels = self.render(lit=0)
+        self.assertLess(abs(pixels[..., :3]).max(), 1e-6)
+        self.assertLess(abs(pixels[6:10, 6:10, 3] - 1).max(), 1e-6)
+        for beside in (pixels[:, :6, 3], pixels[:, 10:, 3], pixels[:6, :, 3], pixels[10:, :, 3]):
+            self.assertLess(abs(beside).max(), 1e-6)
+
+    def test_lights_of_the_scene_alone_brighten_and_throw_no_shadow(self):
+        # In the shadow nothing of both suns is left; beside it the clear floor is not made darker than clear.
+        pixels = self.render(lit=0.5)
+        self.assertLess(abs(pixels[6:10, 6:10, 3] - 1).max(), 1e-6)
+        self.assertLess(abs(pixels[4, 4, 3]), 1e-6)
+
+    def test_the_world_that_the_camera_sees_is_darkened(self):
+        # By the sun's part of what lights the floor: 2 beside pi of the even world, of which the square hides some.
+        pixels = self.render("--vpls", "20000", lit=0, color=[1, 1, 1])
+        self.assertLess(abs(pixels[0, 0, :3] - 1).max(), 1e-4)
+        self.assertLess(abs(pixels[4, 4, :3] - 1).max(), 0.2)
+        left = pixels[8, 8, 0]
+        self.assertGreater(left, 0.15)
+        self.assertLess(left, 1 - 2 / (2 + 3.1416))
+        self.assertLess(abs(pixels[8, 8, 3] - (1 - left)), 1e-4)
+
+    def test_passes_and_crops_are_of_them_too(self):
+        whole = self.render("--passes", "3", lit=0)
+        part = self.render("--passes", "3", "--crop", "4,5,12,9", lit=0)
+        self.assertEqual(part.shape[:2], (4, 8))
+        self.assertEqual(abs(part - whole[5:9, 4:12]).max(), 0)
+
+    def test_what_cannot_be_is_said(self):
+        self.assertIn("--squares: not with shadow catchers", self.render("--squares", "1", code=USAGE))
+        self.render("--vpl-out", self.folder / "a.vpl", lit=0)
+        self.assertIn("--vpl-in: not with shadow catchers", self.render("--vpl-in", self.folder / "a.vpl", code=USAGE))
+        self.assertIn("shows no shadow where no light", self.render("--strict", sun=False, code=BAD_FILE))
+
+    def test_other_commands_say_that_they_take_them_for_objects(self):
+        self.render(lit=0)
+        cameras = self.folder / "cameras.json"
+        cameras.write_text(json.dumps({"frames": 1, "views": [{"eye": [0, 5, 3], "at": [0, 0, 0], "fov_y": 40}]}))
+        result = lumicut("errors", self.folder / "scene.json", "-o", self.folder / "errors.json", "--vpls", "10")
+        self.assertIn("which is an ordinary object to `lumicut errors`", result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
