@@ -216,10 +216,12 @@ uint32_t BallTree::build_top_down(std::vector<uint32_t>& nodes) {
         for (size_t i = r.begin; i + 1 < r.end; ++i) grow(nodes[i]), cost[i] = volume(radius * scale);
         start(nodes[r.end - 1]);
         bool better = false;
+        // Of equal costs the evenest split: balls that are all alike make no chain.
+        const auto uneven = [&](size_t i) { return std::max(i - r.begin, r.end - i); };
         for (size_t i = r.end - 1; i > r.begin; --i) {
           grow(nodes[i]);
           const double sum = cost[i - 1] + volume(radius * scale);
-          if (sum < best || (better && sum == best)) best = sum, split = i, better = true;
+          if (sum < best || (better && sum == best && uneven(i) < uneven(split))) best = sum, split = i, better = true;
         }
         if (better)
           best_order.assign(nodes.begin() + static_cast<std::ptrdiff_t>(r.begin),
@@ -276,16 +278,17 @@ uint32_t BallTree::best_sibling(uint32_t leaf) const {
   std::priority_queue<Fringe, std::vector<Fringe>, decltype(later)> fringe(later);
   uint32_t best = root_;
   double cost = volume(joint_radius(root_, c, radius));
+  const double least = volume(radius);  // of any joint ball
   if (nodes_[root_].leaf == kNone) fringe.push({0, cost, root_});
   while (!fringe.empty()) {
     const Fringe f = fringe.top();
     fringe.pop();
-    if (f.expansion >= cost) break;
+    if (f.expansion + least >= cost) break;
     const double expansion = f.expansion + f.joint - volume(nodes_[f.node].radius);
     for (const uint32_t child : {nodes_[f.node].left, nodes_[f.node].right}) {
       const double joint = volume(joint_radius(child, c, radius));
       if (joint + expansion < cost) cost = joint + expansion, best = child;
-      if (nodes_[child].leaf == kNone && expansion < cost) fringe.push({expansion, joint, child});
+      if (nodes_[child].leaf == kNone && expansion + least < cost) fringe.push({expansion, joint, child});
     }
   }
   return best;

@@ -208,6 +208,17 @@ TEST(BallTree, DuplicatesHaveNoVolume) {
   }
 }
 
+// A chain of them would take minutes.
+TEST(BallTree, ManyBallsThatAreAlikeTakeNoQuadraticTime) {
+  constexpr size_t kCount = 200000;
+  const std::vector<double> c(2 * kCount, 0.5), r(kCount, 1.0);
+  for (const BallTreeBuilder builder : kBuilders)
+    for (const bool points : {false, true}) {
+      const BallTree t = BallTree::build(c, points ? std::span<const double>() : r, 2, builder);
+      EXPECT_EQ(t.size(), kCount);
+    }
+}
+
 TEST(BallTree, RefusesBadInputByName) {
   EXPECT_THROW(BallTree(0), Error);
   const std::vector<double> c{0, 0, 1, std::numeric_limits<double>::quiet_NaN()};
