@@ -177,6 +177,26 @@ PaintRef power_paint(PaintRef base, double exponent) {
   return paint;
 }
 
+namespace {
+double below_coat(double base, double kept) {
+  base = std::clamp(base, 0.0, 1.0);
+  return base * (1 - kept) / (1 - base * kept);
+}
+}  // namespace
+
+PaintRef coated_paint(PaintRef base, double index) {
+  const double kept = std::min(internal_reflectance(index), 0.999);
+  if (const auto value = constant_of(base)) {
+    Vec out;
+    for (size_t k = 0; k < 3; ++k) out[k] = below_coat((*value)[k], kept);
+    return constant_paint(out);
+  }
+  auto paint = std::make_shared<Paint>();
+  paint->kind = Paint::Kind::coated, paint->size = base->size + 1;
+  paint->a = std::move(base), paint->value[0] = kept;
+  return paint;
+}
+
 PaintRef behind_paint() {
   auto paint = std::make_shared<Paint>();
   paint->kind = Paint::Kind::behind;
@@ -315,6 +335,11 @@ Vec SceneBuilder::mean_of(const PaintRef& paint) const {
       for (double& x : out) x = std::pow(std::max(0.0, x), paint->value[0]);
       return out;
     }
+    case Paint::Kind::coated: {
+      Vec out = mean_of(paint->a);
+      for (double& x : out) x = below_coat(x, paint->value[0]);
+      return out;
+    }
     default:
       return {0.5, 0.5, 0.5};
   }
@@ -403,6 +428,15 @@ int32_t SceneBuilder::compile(const PaintRef& paint, Program& program) {
       const int32_t a = compile(paint->a, program);
       const int32_t exponent = constant(paint->value[0], paint->value[0], paint->value[0]);
       return step(LUMICUT_OP_MATH, kPower, {a, exponent});
+    }
+    case Paint::Kind::coated: {
+      constexpr uint32_t kDivide = 3, kMinimum = 16;
+      const double kept = paint->value[0];
+      const int32_t one = constant(1, 1, 1);
+      const int32_t base = step(LUMICUT_OP_VECTOR, kMinimum, {compile(paint->a, program), one});
+      const int32_t rest = step(LUMICUT_OP_VECTOR, kMultiplyAdd, {base, constant(-kept, -kept, -kept), one});
+      const int32_t share = step(LUMICUT_OP_VECTOR, kDivide, {base, rest});
+      return step(LUMICUT_OP_VECTOR, kMultiply, {share, constant(1 - kept, 1 - kept, 1 - kept)});
     }
   }
   return 0;

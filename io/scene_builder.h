@@ -58,9 +58,10 @@ struct TexturePlace {
 struct Paint;
 using PaintRef = std::shared_ptr<const Paint>;
 struct Paint {
-  enum class Kind { constant, image, checker, axis, along, behind, product, mix, invert, power };
+  enum class Kind { constant, image, checker, axis, along, behind, product, mix, invert, power, coated };
   Kind kind = Kind::constant;
-  Vec value{0, 0, 0};    // constant; power: the exponent in [0]; along: a direction, whose cosine to the normal it is
+  Vec value{0, 0, 0};    // constant; power: the exponent in [0]; along: a direction, whose cosine to the normal it is;
+                         // coated: what a coat reflects to its inside in [0]
   int32_t texture = 0;   // image
   uint32_t mode = 0;     // image: as LUMICUT_OP_IMAGE has it; axis: which coordinate
   TexturePlace place;    // image, checker (squares, or cubes), axis
@@ -70,6 +71,9 @@ struct Paint {
 PaintRef constant_paint(const Vec& value);
 PaintRef constant_paint(double value);
 PaintRef power_paint(PaintRef base, double exponent);
+// The colour that `base` shows below a smooth dielectric of that index, over what it shows bare: light that the coat keeps
+// inside meets the base again and again. [Egan and Hilgeman 1973; Jakob's plastic in Mitsuba, "nonlinear"]
+PaintRef coated_paint(PaintRef base, double index);
 PaintRef behind_paint();  // 1 where the back is seen
 // What it is without the place; nothing where it depends on that.
 std::optional<Vec> constant_of(const PaintRef& paint);

@@ -480,13 +480,14 @@ class Reader {
       m = default_material();
       build_.set_colour(paint(node, "reflectance", 0.5), m.diffuse, m.diffuse_texture);
     } else if (kind == "plastic" || kind == "roughplastic" || kind == "pplastic") {
-      build_.set_colour(paint(node, "diffuse_reflectance", 0.5), m.diffuse, m.diffuse_texture);
       m.ior = relative_index(node, "polypropylene");
+      const PaintRef base = paint(node, "diffuse_reflectance", 0.5);
+      const bool nonlinear = truth(node, "nonlinear", false);
+      build_.set_colour(nonlinear ? coated_paint(base, m.ior) : base, m.diffuse, m.diffuse_texture);
       if (const Node c = child(node, "specular_reflectance"))
         if (const auto value = constant_of(paint_of(c, false)))
           for (size_t k = 0; k < 3; ++k) m.specular[k] = static_cast<float>(std::clamp((*value)[k], 0.0, 1.0));
       if (kind != "plastic") set_alpha(node, m, 0.1);
-      truth(node, "nonlinear", false);
     } else if (kind == "dielectric" || kind == "roughdielectric" || kind == "thindielectric") {
       m.transmission = 1;
       m.ior = relative_index(node, "bk7");

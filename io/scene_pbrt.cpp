@@ -589,8 +589,8 @@ class Reader {
       build_.set_colour(paint(p, "reflectance", 0.5), m.diffuse, m.diffuse_texture);
     } else if (kind == "coateddiffuse") {
       ggx();
-      build_.set_colour(paint(p, "reflectance", 0.5), m.diffuse, m.diffuse_texture);
       m.ior = static_cast<float>(index(p, "eta", 1.5));
+      build_.set_colour(coated_paint(paint(p, "reflectance", 0.5), m.ior), m.diffuse, m.diffuse_texture);
       set_roughness(p, "", m);
     } else if (kind == "conductor") {
       ggx();

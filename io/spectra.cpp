@@ -6,6 +6,23 @@
 
 namespace lumicut::io {
 
+double internal_reflectance(double index) {
+  // Fresnel's equations, weighted by the cosine.
+  constexpr int kSteps = 4096;
+  double sum = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double c2 = (i + 0.5) / kSteps, sine2 = index * index * (1 - c2);  // even in the square of the cosine
+    if (sine2 >= 1) {
+      sum += 1;
+      continue;
+    }
+    const double c = std::sqrt(c2), t = std::sqrt(1 - sine2);
+    const double across = (index * c - t) / (index * c + t), along = (c - index * t) / (c + index * t);
+    sum += 0.5 * (across * across + along * along);
+  }
+  return sum / kSteps;
+}
+
 Metal metal_of(const Vec& eta, const Vec& k) {
   // Fresnel's equations for a conductor in air.
   const auto reflectance = [](double c, double n, double absorbing) {

@@ -21,6 +21,9 @@ inline double luminance(const Vec& rgb) { return 0.2126 * rgb[0] + 0.7152 * rgb[
 Vec blackbody(double kelvin);
 Vec blackbody_radiance(double kelvin);
 
+// The mean reflectance of a smooth dielectric to even light from its inside; `index`: inside over outside.
+double internal_reflectance(double index);
+
 // A metal of complex index of refraction, as base colour and tint at 82 degrees of the library's GGX.
 struct Metal {
   Vec colour, tint;

@@ -12,7 +12,7 @@ import numpy as np
 import test_gltf
 import test_models
 from cli import BAD_FILE, COMMAND, OK, lumicut
-from test_pbrt import SceneFiles
+from test_pbrt import SceneFiles, kept_inside
 
 
 def scene(*parts):
@@ -132,6 +132,8 @@ class Mitsuba(SceneFiles):
                 (bsdf("diffuse", rgb("reflectance", 0.2, 0.4, 0.6)), {"diffuse": [0.2, 0.4, 0.6]}),
                 (bsdf("plastic", rgb("diffuse_reflectance", 0.2, 0.4, 0.6) + '<float name="int_ior" value="1.3"/><float name="ext_ior" value="1"/>'),
                  {"model": "ggx", "diffuse": [0.2, 0.4, 0.6], "roughness": 0, "ior": 1.3}),
+                (bsdf("plastic", rgb("diffuse_reflectance", 0.2, 0.4, 0.6) + '<float name="int_ior" value="1.3"/><float name="ext_ior" value="1"/><boolean name="nonlinear" value="true"/>'),
+                 {"model": "ggx", "diffuse": [c * (1 - kept_inside(1.3)) / (1 - c * kept_inside(1.3)) for c in (0.2, 0.4, 0.6)], "roughness": 0, "ior": 1.3}),
                 (bsdf("roughplastic", ggx(0.25) + '<string name="int_ior" value="water"/><string name="ext_ior" value="vacuum"/>'),
                  {"model": "ggx", "diffuse": [0.5, 0.5, 0.5], "roughness": 0.5, "ior": 1.333}),
                 (bsdf("roughconductor", ggx(0.25) + '<string name="material" value="none"/>' + rgb("specular_reflectance", 0.9, 0.6, 0.3)),
