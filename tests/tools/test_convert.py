@@ -105,7 +105,7 @@ class Convert(cli.Cli):
                              (self.write("e.dae", test_models.collada(MESHES)), size), (self.write("f.fbx", test_models.fbx(MESHES)), size),
                              (ROOT / "reference_images/cornell_box/cornell_box.json", size),
                              *((ROOT / "tests/tools/scenes" / name, size)
-                               for name in ("cornell.pbrt", "materials.pbrt", "forest.pbrt", "mixes.pbrt", "cornell.xml", "table.xml"))):
+                               for name in ("cornell.pbrt", "materials.pbrt", "forest.pbrt", "mixes.pbrt", "hair.pbrt", "cornell.xml", "table.xml"))):
             with self.subTest(scene.name):
                 self.assert_same_image(scene, *words)
 
