@@ -10,6 +10,7 @@ import numpy as np
 from . import lights, linking, mesh_attributes, program_values, programs, strands, worlds
 from .lumicut import library
 from .cameras import rows
+from .images import srgb_to_linear
 from .materials import Materials
 from .report import Report
 from .scene_data import Mesh, Owner, SceneData, flattened, is_flat
@@ -409,51 +410,87 @@ class Collector:
             slots = self._slots(ob, override)
             slot = slots[min(settings.material, len(slots)) - 1]
 
-            def shape(textured, system=system):
+            def shape(textured, names, system=system):
                 places, radii, numbers = strands.hair_of_particles(ob, system, self.depsgraph.mode == "VIEWPORT", self.check)
                 places, radii = strands.straightened(places, radii)
-                uvs = self._root_uvs(ob, system, numbers, places.shape[1]) if textured else None
-                return [(*strands.tubes(places, radii), uvs)]
+                uvs = self._at_roots(ob, system, numbers, places.shape[1]) if textured else None
+                told = strands.info(places, radii, range(len(places))) if any(name[0] == "strand" for name in names) else {}
+                found = {name: strands.on_tubes(told[name[1]]) for name in names if name[0] == "strand"}
+                for name in names:
+                    if name[0] in {"uv", "layer"} and (at_roots := self._at_roots(ob, system, numbers, places.shape[1], name)) is not None:
+                        found[name] = at_roots
+                return [(*strands.tubes(places, radii), uvs, found)]
 
             self._add_shapes(instance, ob, slot, ("hair", ob.as_pointer(), system.name), f"{ob.name}: {system.name}", shape)
 
-    def _root_uvs(self, ob, system, numbers, keys):
-        """Texture coordinates where each hair grows, for all of its vertices; None without any."""
+    def _at_roots(self, ob, system, numbers, keys, name=("uv", "")):
+        """Texture coordinates, or a colour, where each hair grows, for all of its vertices; None without any."""
         modifier = next((m for m in ob.modifiers if m.type == "PARTICLE_SYSTEM" and m.particle_system.name == system.name), None)
-        if modifier is None or not ob.data.uv_layers:
+        layers, colours = ob.data.uv_layers, ob.data.vertex_colors
+        of_colour = name[0] == "layer" and name[1] not in layers
+        if of_colour:
+            layer = colours.find(name[1]) if name[1] else colours.active_index
+        else:
+            layer = layers.find(name[1]) if name[1] else next((i for i, l in enumerate(layers) if l.active_render), 0)
+        if modifier is None or not 0 <= layer < len(colours if of_colour else layers):
             return None
         parents = len(system.particles)
-        uvs = np.empty((len(numbers), 2), np.float32)
+        values = np.empty((len(numbers), 3 if of_colour else 2), np.float32)
         for i, number in enumerate(numbers.tolist()):
             if i % 1024 == 0:
                 self.check()
             particle = system.particles[number] if number < parents else system.particles[0]
-            uvs[i] = system.uv_on_emitter(modifier, particle=particle, particle_no=number, uv_no=0)
-        return np.repeat(uvs, keys * strands.SIDES, axis=0)
+            if of_colour:
+                values[i] = system.mcol_on_emitter(modifier, particle=particle, particle_no=number, vcol_no=layer)
+            else:
+                values[i] = system.uv_on_emitter(modifier, particle=particle, particle_no=number, uv_no=layer)
+        return np.repeat(srgb_to_linear(values) if of_colour else values, keys * strands.SIDES, axis=0)
 
     def _add_curves(self, instance, ob, override):
-        def shape(_):
-            return [(*strands.tubes(places, radii), None) for places, radii in strands.curve_strands(ob.data, fetch)]
+        def shape(_, names):
+            made = []
+            for places, radii, points, numbers in strands.curve_strands(ob.data, fetch):
+                told = strands.info(places, radii, numbers, even=True)
+                found = {name: strands.on_tubes(told[name[1]]) for name in names if name[0] == "strand"}
+                found |= {name: strands.on_tubes(values) for name in names if name[0] == "layer"
+                          and (values := self._of_curves(ob, name[1], points, numbers)) is not None}
+                made.append((*strands.tubes(places, radii), None, found))
+            return made
 
         self._add_shapes(instance, ob, self._slots(ob, override)[0], ("curves", ob.data.as_pointer()), ob.name, shape)
 
+    def _of_curves(self, ob, name, points, numbers):
+        """(strands, keys, components) of an attribute of a curves object; None: it has none of that name."""
+        attribute = ob.data.attributes.get(name)
+        if attribute is None or attribute.data_type not in mesh_attributes.WIDTHS:
+            self.report.note(ob.name, f"Meshes without the attribute \"{name}\" that a material wants")
+            return None
+        values = mesh_attributes.numbers_of(attribute, fetch)
+        return values[points] if attribute.domain == "POINT" else np.repeat(values[numbers][:, None], points.shape[1], 1)
+
     def _add_shapes(self, instance, ob, material, key, name, shape):
-        """Adds meshes that are made here, once for all instances. `shape`, told whether its material has textures, gives
-        [(positions, normals, indices, uvs)]."""
+        """Adds meshes that are made here, once for all instances. `shape`, told whether its material has textures and which
+        attributes its programs ask for, gives [(positions, normals, indices, uvs, {attribute: values})]."""
         for numbers, mask in self._variants(ob, [material], lambda: False):
             number, group = numbers[0], self._group_of_light(ob, numbers)
             if self.materials.converted[number].is_hole():
                 continue
             links = self.linking.of(ob)
             made = key, number, group, mask, ob.is_shadow_catcher, links
+            names = list(dict.fromkeys(self.materials.converted[number].attributes()))
             if made not in self._shapes:
                 self.check()
                 self._shapes[made] = [Mesh(name, positions, indices, normals, uvs, None, number, [], group, mask,
+                                           [(self.materials.attribute_number(of), library.OF_VERTICES, values)
+                                            for of, values in found.items()],
                                            catcher=ob.is_shadow_catcher, links=links)
-                                      for positions, normals, indices, uvs
-                                      in shape(bool(self.materials.converted[number].plain_pictures())) if len(indices)]
+                                      for positions, normals, indices, uvs, found
+                                      in shape(bool(self.materials.converted[number].plain_pictures()), names) if len(indices)]
             for mesh in self._shapes[made]:
                 mesh.transforms.append(rows(instance.matrix_world))
+                for of in names:
+                    if of[0] in mesh_attributes.OF_INSTANCE:
+                        mesh.of_instances.setdefault(self.materials.attribute_number(of), []).append(mesh_attributes.of_instance(of, instance))
                 self._own(mesh, ob)
                 self.instances += 1
 
@@ -469,14 +506,32 @@ class Collector:
             if self.materials.converted[number].is_hole():
                 continue
             links = self.linking.of(ob)
-            made = "sphere", number, group, mask, ob.is_shadow_catcher, links
+            own = any(of[0] == "layer" for of in self.materials.converted[number].attributes())
+            made = "sphere", ob.name_full if own else None, number, group, mask, ob.is_shadow_catcher, links
             if made not in self._shapes:
                 positions, indices = strands.unit_sphere()
                 self._shapes[made] = [Mesh("spheres of points", positions, indices, positions, None, None, number, [], group, mask,
                                            catcher=ob.is_shadow_catcher, links=links)]
-            self._shapes[made][0].transforms += transforms
+            mesh = self._shapes[made][0]
+            mesh.transforms += transforms
+            for of in dict.fromkeys(self.materials.converted[number].attributes()):
+                values = None
+                if of[0] in mesh_attributes.OF_INSTANCE:
+                    values = [mesh_attributes.of_instance(of, instance)] * len(transforms)
+                elif of[0] == "layer":
+                    values = self._of_points(ob, of[1], radii > 0)
+                if values is not None:
+                    mesh.of_instances.setdefault(self.materials.attribute_number(of), []).extend(values)
             self._own(self._shapes[made][0], ob, len(transforms))
             self.instances += len(transforms)
+
+    def _of_points(self, ob, name, kept):
+        """[numbers] of an attribute of a point cloud, of points that are kept; None: it has none of that name."""
+        attribute = ob.data.attributes.get(name)
+        if attribute is None or attribute.data_type not in mesh_attributes.WIDTHS:
+            self.report.note(ob.name, f"Meshes without the attribute \"{name}\" that a material wants")
+            return None
+        return mesh_attributes.numbers_of(attribute, fetch)[kept].tolist()
 
     def _add_variant(self, instance, ob, mesh, slots, numbers, mask):
         """`numbers`: materials by slot; `mask`: of the rays that see them."""

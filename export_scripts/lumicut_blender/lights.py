@@ -27,6 +27,8 @@ SPOT_WITHOUT_COSINE = (4, 0, 0)
 # Read in the sources of both: before 4.0 lamps are disks that face each point, since then spheres, but for those of a soft
 # falloff, which came with 4.1 and is what new lamps have. Measured against 3.4.1 and 4.3.2.
 LAMPS_ARE_SPHERES = (4, 0, 0)
+# Measured: 3.4.1 leaves a spot's scale out, 4.3.2 stretches the cone by it.
+SPOTS_ARE_STRETCHED = (4, 0, 0)
 # Measured: 3.4.1 interpolates IES files around the full circle, 4.3.2 takes 0 beyond 0 and 360 degrees, which makes them
 # up to 1/16 brighter in their first and last interval, and files that are the same all around 1/8.
 IES_WITHOUT_WRAP = (4, 3, 0)
@@ -167,9 +169,9 @@ class Profiles:
         mirrored = np.linalg.det(axes) < 0
         source, vertical, horizontal, candela = table
         if light.type == "SPOT":
-            axis = rotation @ (0, 0, -1)  # of the cone, where the file is looked up
-            vertical, horizontal, candela = _cut_cone(vertical, horizontal, candela, axis, light)
-            key += (light.spot_size, light.spot_blend, tuple(axis.round(6)))
+            scale = stretch_of(matrix)
+            vertical, horizontal, candela = _cut_cone(vertical, horizontal, candela, rotation, light, scale)
+            key += (light.spot_size, light.spot_blend, tuple((rotation @ (0, 0, -1)).round(6)), tuple(scale))
             if not candela.any():
                 self.report.note(f"{name}: {source}", f"{what} that give nothing within their spot's cone")
                 return False
@@ -187,17 +189,28 @@ class Profiles:
         return True
 
 
-def _cut_cone(vertical, horizontal, candela, axis, light):
-    """A table times the falloff of a spot whose axis lies towards `axis`."""
+def stretch_of(matrix):
+    """Scale of a spot's cone along its own axes, the last 1."""
+    if bpy.app.version < SPOTS_ARE_STRETCHED:
+        return np.ones(3)
+    scale = np.linalg.norm(np.array(matrix, np.float64)[:3, :3], axis=0)
+    return np.ones(3) if np.ptp(scale) <= 1e-4 * scale.max() or not scale[2] > 0 else (scale / scale[2]).round(5)
+
+
+def _cut_cone(vertical, horizontal, candela, rotation, light, scale):
+    """A table times the falloff of a spot that `rotation` takes to where the table is looked up, stretched by `scale`."""
+    axis = rotation @ (0, 0, -1)
     half = light.spot_size / 2
     outer = math.cos(half)
     width = (1 - outer) * light.spot_blend
-    along = axis[2] < -1 + 1e-6  # both axes are one: the edge lies at one vertical angle
+    along = axis[2] < -1 + 1e-6 and (scale == 1).all()  # both axes are one: the edge lies at one vertical angle
     if along:
         soft = math.acos(min(1.0, outer + width))
         finer = np.concatenate([np.linspace(soft, half, 65), np.arange(0, half, math.radians(1)), [half - 2e-5, half + 2e-5]])
     else:
         finer = np.linspace(0, math.pi, 361)
+        if (scale != 1).any():  # sharp where the cone ends
+            finer = np.concatenate([finer, np.linspace(0, min(math.pi, 1.02 * math.atan(math.tan(min(half, 1.55)) * scale.max())), 721)])
         if len(horizontal) < 181:
             values = candela if len(horizontal) > 1 else np.repeat(candela, 2, 0)
             old, horizontal = np.linspace(0, 2 * math.pi, 2) if len(horizontal) == 1 else horizontal, np.linspace(0, 2 * math.pi, 361)
@@ -208,7 +221,8 @@ def _cut_cone(vertical, horizontal, candela, axis, light):
     # As ies.py has it: -z at vertical angle 0, -y at horizontal angle 0, -x at 90 degrees.
     s, c = np.sin(angles)[None], np.cos(angles)[None]
     h = horizontal[:, None]
-    cosine = -axis[0] * s * np.sin(h) - axis[1] * s * np.cos(h) - axis[2] * c
+    own = np.stack(np.broadcast_arrays(-s * np.sin(h), -s * np.cos(h), -c), -1) @ rotation / scale
+    cosine = -own[..., 2] / np.linalg.norm(own, axis=-1)
     x = np.clip((cosine - outer) / width, 0, 1) if width > 0 else (cosine > outer) * 1.0
     falloff = x * x * (3 - 2 * x)
     if bpy.app.version < SPOT_WITHOUT_COSINE:
@@ -221,8 +235,20 @@ def convert_light(name, light, matrix, images, report, profiles, picture_number)
     `picture_number`: of a Picture among the scene's."""
     emission, of_ies, compiled = emission_of(light, images, report)
     out = _plain_light(name, light, matrix, emission if compiled is None else np.ones(3), of_ies, report, profiles)
-    if out is None or compiled is None:
-        return [] if out is None else [out]
+    if out is None:
+        return []
+    if out.type == library.SPOT and (stretch_of(matrix) != 1).any():
+        radius = out.radius
+        out.radius = 0.0
+        even = name, np.array([0, math.pi]), np.zeros(1), np.ones((1, 2)) / PER_CANDELA
+        if compiled is None and profiles.add_table(name, light, ("stretched",), even, np.eye(3), matrix, out, "a stretched cone"):
+            out.angle, out.blend, out.spot_cosine = 0.0, 0.0, 0
+            if radius > 0:
+                report.note(name, "Stretched spots of a radius, taken as 32 points")
+            return _over_disk(out, radius)
+        out.radius = radius
+    if compiled is None:
+        return [out]
     m = np.array(matrix)[:3]
     expr = compiled(m[:, :3] / np.maximum(np.linalg.norm(m[:, :3], axis=0), 1e-30), m[:, 3])
     own = np.array(out.color)
@@ -254,6 +280,21 @@ def convert_light(name, light, matrix, images, report, profiles, picture_number)
                               "textures by direction"):
             part.angle, part.blend, part.spot_cosine = 0.0, 0.0, 0
             lights.append(part)
+    return lights
+
+
+def _over_disk(lamp, radius, count=32):
+    """Lights in place of one of a radius, over the disk across its direction: a table by direction has a place of its own."""
+    if not radius > 0:
+        return [lamp]
+    axis, right = np.array(lamp.direction), np.array(lamp.tangent)
+    up, lights = np.cross(axis, right), []
+    for i in range(count):  # Vogel's spiral
+        r, turn = radius * math.sqrt((i + 0.5) / count), i * math.pi * (3 - math.sqrt(5))
+        part = library.Light.from_buffer_copy(lamp)
+        part.position[:] = (np.array(lamp.position) + r * (math.cos(turn) * right + math.sin(turn) * up)).tolist()
+        part.value = lamp.value / count
+        lights.append(part)
     return lights
 
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What texture programs ask of meshes and objects: coordinates, colour and other attributes, random numbers.
 
-An attribute is named by a tuple: ("uv", map), ("layer", name), ("generated",), ("undisplaced",), ("island",) are of meshes; ("object", output),
+An attribute is named by a tuple: ("uv", map), ("layer", name), ("generated",), ("undisplaced",), ("island",) are of meshes; ("strand", output) of
+hair and curves; ("object", output),
 ("property", name), ("world_to_object",) and ("object_to_world",) of instances.
 """
 import numpy as np
@@ -98,6 +99,13 @@ def islands(edges, vertices):
     return [root(x) for x in range(vertices)]
 
 
+def numbers_of(attribute, fetch):
+    """(places, components) of an attribute of a type among WIDTHS."""
+    field, width = WIDTHS[attribute.data_type]
+    dtype = {"INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}.get(attribute.data_type, np.float32)
+    return fetch(attribute.data, field, len(attribute.data), width, dtype).reshape(-1, width).astype(np.float32)
+
+
 class AttributeReader:
     """Attributes of one evaluated mesh. `fetch`: collect.fetch; `note(text)`: of what is missing."""
 
@@ -109,6 +117,8 @@ class AttributeReader:
         kind = name[0]
         if kind == "uv":
             return "corner", layer(name[1], loops)
+        if kind == "strand":
+            return None  # 0, as of what is none
         if kind == "generated":
             return "vertex", self.generated()
         if kind == "undisplaced":
@@ -147,9 +157,7 @@ class AttributeReader:
         if attribute is None or attribute.data_type not in WIDTHS:
             self.note(f"Meshes without the attribute \"{name}\" that a material wants")
             return None
-        field, width = WIDTHS[attribute.data_type]
-        dtype = {"INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}.get(attribute.data_type, np.float32)
-        values = self.fetch(attribute.data, field, len(attribute.data), width, dtype).reshape(-1, width).astype(np.float32)
+        values, width = numbers_of(attribute, self.fetch), WIDTHS[attribute.data_type][1]
         if attribute.domain == "POINT":
             return "vertex", values
         if attribute.domain == "CORNER":

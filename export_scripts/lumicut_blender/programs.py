@@ -419,6 +419,11 @@ class Compiler:
             raise CannotCompile(f"Particle Info: {output.name}")
         return attribute(("object", "Random"))
 
+    def _hair_info(self, node, output, stack):
+        if output.name == "Tangent Normal":
+            raise CannotCompile("Curves Info: Tangent Normal")
+        return attribute(("strand", output.name), 0, {"Is Strand": 1.0, "Length": 0.0, "Thickness": 0.0}.get(output.name, 0.5))
+
     def _vertex_color(self, node, output, stack):
         return attribute(("layer", node.layer_name), int(output.name == "Alpha"), 1.0 if output.name == "Alpha" else 0.5)
 

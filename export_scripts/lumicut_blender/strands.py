@@ -5,6 +5,8 @@ A tube is a prism of three sides under smooth normals, as wide on the average of
 """
 import numpy as np
 
+from .mesh_attributes import MASK, jenkins
+
 SIDES = 3
 WIDER = np.pi / (SIDES * np.sin(np.pi / SIDES))  # of a round tube's radius: a convex body's mean width goes by its perimeter
 BEND = 0.25  # of its radius: how far a strand may lie off its tube's middle
@@ -87,8 +89,27 @@ def tubes(places, radii):
             indices[wide].astype(np.int32))
 
 
+def info(places, radii, numbers, even=False):
+    """{output of Curves Info: (strands, keys)} of strands of these numbers. `even`: Intercept goes by keys, else by length."""
+    steps = np.linalg.norm(np.diff(places, axis=1), axis=2)
+    along = np.concatenate([np.zeros((len(places), 1)), np.cumsum(steps, 1)], 1)
+    length = along[:, -1:]
+    shape = along.shape
+    share = np.broadcast_to(np.linspace(0, 1, shape[1]), shape) if even else along / np.maximum(length, 1e-30)
+    random = np.array([jenkins(int(number), 0) / MASK for number in numbers])
+    return {"Is Strand": np.ones(shape), "Intercept": share, "Length": np.broadcast_to(length, shape),
+            "Thickness": np.broadcast_to(2 * radii, shape), "Random": np.broadcast_to(random[:, None], shape)}
+
+
+def on_tubes(values):
+    """(strands, keys) or (strands, keys, components) as the tubes' vertices have them."""
+    values = np.asarray(values, np.float32)
+    return np.repeat(values.reshape(*values.shape[:2], 1, -1), SIDES, 2).reshape(values.shape[0] * values.shape[1] * SIDES, -1)
+
+
 def curve_strands(curves, fetch):
-    """Of a curves object: groups of strands with as many keys, as (places, radii). `fetch`: collect.fetch."""
+    """Of a curves object: groups of strands with as many keys, as (places, radii, numbers of points, of curves). `fetch`:
+    collect.fetch."""
     count = len(curves.points)
     places = fetch(curves.attributes["position"].data, "vector", count, 3, np.float32).astype(np.float64)
     radius = curves.attributes.get("radius")
@@ -98,7 +119,7 @@ def curve_strands(curves, fetch):
     lengths = np.array([curve.points_length for curve in curves.curves], np.int64)
     for keys in np.unique(lengths[lengths > 1]):
         at = first[lengths == keys][:, None] + np.arange(keys)
-        yield places[at], radii[at]
+        yield places[at], radii[at], at, np.flatnonzero(lengths == keys)
 
 
 def spheres(places, radii, matrix):

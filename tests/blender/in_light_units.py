@@ -65,6 +65,15 @@ class LightUnits(unittest.TestCase):
                 h.add_light("SPOT", (0, 0, 2.5), 200, spot_size=math.radians(size), spot_blend=blend, shadow_soft_size=0)
                 self.agree(block=0.06 if blend == 0 else BLOCK)
 
+    def test_spots_whose_scale_stretches_the_cone(self):
+        """In 3.4 it does not."""
+        for scale, blend, radius in (((1, 1.6, 1), 0, 0), ((2, 1, 0.8), 0.6, 0), ((1, 1, 1.6), 0.3, 0.1), ((2, 2, 2), 0.3, 0.4)):
+            with self.subTest(scale=scale, blend=blend, radius=radius):
+                self.setUp()
+                h.add_light("SPOT", (0, 0, 2.5), 200, (0.1, 0.2, 0.5), scale, spot_size=math.radians(60), spot_blend=blend,
+                            shadow_soft_size=radius)
+                self.agree(block=0.15 if blend == 0 else 0.1)  # edges, as above
+
     def test_tilted_spot(self):
         h.add_light("SPOT", (1.5, 0, 2.5), 200, (0, math.radians(35), 0), spot_size=math.radians(90), spot_blend=0.3,
                     shadow_soft_size=0)

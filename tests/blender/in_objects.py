@@ -396,3 +396,66 @@ class Displacement(BesideCycles):
         # Slopes over other steps on coarse triangles.
         np.testing.assert_allclose(ours["Combined"].mean((0, 1)), theirs["Combined"].mean((0, 1)), rtol=0.06)
         self.assertEqual(h.last_notes(), [])
+
+
+class Strands(unittest.TestCase):
+    """What Curves Info and attributes tell of hair and curves, shown as emission beside Cycles."""
+
+    def setUp(self):
+        self.scene = h.new_scene(48, 48)
+        h.set_world((0, 0, 0))
+        self.scene.camera.location.z = 4
+        self.m = h.material("shown")
+        self.emission = h.shader(self.m, "ShaderNodeEmission")
+        self.ground = h.add_plane(3, material=self.m)
+
+    def hair(self, **more):
+        self.ground.modifiers.new("grass", "PARTICLE_SYSTEM")
+        settings = self.ground.particle_systems[0].settings
+        settings.type, settings.count, settings.hair_length = "HAIR", 400, 0.8
+        settings.root_radius, settings.tip_radius, settings.radius_scale = 1.0, 0.3, 0.05
+        for name, value in more.items():
+            setattr(settings, name, value)
+
+    def agree(self, node, output):
+        tree = self.m.node_tree
+        tree.links.new(node.outputs[output], self.emission.inputs["Color"])
+        with h.quiet():
+            h.set_cycles(64)
+            self.scene.cycles_curves.shape = "THICK"
+            theirs = h.render()["Combined"][..., :3]
+            h.set_lumicut("exhaustive", 4, passes=16, vpls=1)
+            ours = h.render()["Combined"][..., :3]
+        self.assertEqual(h.last_notes(), [])
+        self.assertGreater(theirs.max(), 1e-3)
+        scale = max(1e-3, theirs.max())
+        # Hairs are prisms of three sides, which seen from above cover 5 % less.
+        np.testing.assert_allclose(h.blocks(ours, 8) / scale, h.blocks(theirs, 8) / scale, atol=0.05, err_msg=output)
+        np.testing.assert_allclose(ours.mean(), theirs.mean(), rtol=0.08, err_msg=output)
+
+    def test_curves_info_of_hair(self):
+        self.hair()
+        info = self.m.node_tree.nodes.new("ShaderNodeHairInfo")
+        for output in ("Is Strand", "Intercept", "Length", "Thickness", "Random"):
+            with self.subTest(output):
+                self.agree(info, output)
+
+    def test_coordinates_and_colours_where_hair_grows(self):
+        self.hair()
+        uvs = self.ground.data.uv_layers.new(name="other")
+        colours = self.ground.data.color_attributes.new("tint", "BYTE_COLOR", "CORNER")
+        for i, (u, v) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
+            uvs.data[i].uv = (u, v)
+            colours.data[i].color = (u, v, 0.5, 1)
+        tree = self.m.node_tree
+        node = tree.nodes.new("ShaderNodeUVMap")
+        node.uv_map = "other"
+        self.agree(node, "UV")
+        node = tree.nodes.new("ShaderNodeVertexColor")
+        node.layer_name = "tint"
+        self.agree(node, "Color")
+
+    def test_an_objects_own_numbers_are_its_hairs_too(self):
+        self.hair()
+        self.ground.color = (0.2, 0.7, 0.4, 1)
+        self.agree(self.m.node_tree.nodes.new("ShaderNodeObjectInfo"), "Color")
