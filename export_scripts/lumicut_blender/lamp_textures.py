@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Node trees of area, point and spot lamps that vary over the lamp or by direction: compiled to a program, which the library
-evaluates once, into an image over the lamp or a table by direction.
+"""Node trees of lamps that vary over the lamp or by direction: compiled to a program, which the library evaluates once, into
+an image over an area lamp, a table by direction of point and spot lamps, the mean over the disc of a sun.
 
 What coordinates are to a lamp was measured in Cycles 3.4.1 and 4.3.2: Generated, Object and Position are the place on the
 lamp in the world, Parametric of area lamps goes from 0 to 1 along both sides, and so does UV in 4.3.2, which is 0 in 3.4.1; Normal is the way the light goes,
-Texture Coordinate's in the lamp's own space, Geometry's in the world."""
+Texture Coordinate's in the lamp's own space, Geometry's in the world. To suns the place is that way, too."""
 import math
 
 import bpy
@@ -31,6 +31,9 @@ class LampCompiler(Compiler):
         if light.type == "AREA":
             self.place, self.parametric = POSITION, UV
             self.normal, self.world_normal, self.incoming = const((0, 0, -1)), const(-axes[:, 2]), None
+        elif light.type == "SUN":
+            self.place = self.world_normal = self.incoming = vector_math("NORMALIZE", POSITION)
+            self.parametric, self.normal = const((0.5, 0.5, 0) if UV_IS_PARAMETRIC else (0, 0.5, 0)), const((0, 0, -1))
         else:
             self.place, self.parametric = const(place), None
             self.normal = vector_math("SCALE", TO_VIEWER, const(-1))
@@ -41,6 +44,9 @@ class LampCompiler(Compiler):
         if socket is not None and socket.is_linked and self.reader.source(socket, stack)[0] is not None:
             return self.socket(socket, stack)
         return self.place if otherwise is None else self.uv()
+
+    def _light_falloff(self, node, output, stack):
+        return self.socket(node.inputs["Strength"], stack)  # the rest is falloffs.py's
 
     def uv(self):
         return self.known_or_not("UV of lamps", self.parametric) if UV_IS_PARAMETRIC else ZERO
@@ -94,6 +100,21 @@ def over(expr, place, u, v, y):
         return pixels.mean((0, 1)), None
     key = "lamp", expr.key, tuple(float(x) for x in (*place, *u, *v))
     return np.ones(3), Picture("lamp", key, Mapping(), library.CLAMP, linear=np.ascontiguousarray(pixels, np.float32))
+
+
+def of_disc(expr, way, radius, side=24):
+    """Mean of what a sun's disc, of that angular radius, shines that way."""
+    right = np.cross(way, (0, 0, 1) if abs(way[2]) < 0.9 else (1, 0, 0))
+    right /= np.linalg.norm(right)
+    up, half = np.cross(way, right), max(1e-4, math.tan(min(radius, 1.4)))
+    edges = 2 * half * right, 2 * half * up
+    corners = np.array([way + (s - 0.5) * edges[0] + (t - 0.5) * edges[1] for s, t in ((0, 0), (1, 0), (1, 1), (0, 1))], np.float32)
+    camera = library.Camera(orthographic=1, height=2 * half, pixel_aspect=1.0)
+    back = np.cross(right, up)
+    camera.to_world[:] = [float(x) for x in np.column_stack([right, up, back, way + 2 * half * back]).ravel()]
+    pixels = evaluated(expr, corners, {}, camera, side, side)
+    y, x = (np.mgrid[0:side, 0:side] + 0.5) * 2 / side - 1
+    return pixels[x * x + y * y <= 1].mean(0)
 
 
 def around(expr):

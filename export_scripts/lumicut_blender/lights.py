@@ -6,7 +6,7 @@ import os
 import bpy
 import numpy as np
 
-from . import compat, ies, lamp_textures
+from . import compat, falloffs, ies, lamp_textures
 from .ies import PER_CANDELA
 from .lumicut import library
 from .directions import Directions
@@ -43,6 +43,13 @@ class LampReader(Directions):
     def __init__(self, *arguments):
         super().__init__(*arguments)
         self.of_ies, self.ies = 1.0, None  # (node, rotation)
+        self.falloff = None  # of the first such node
+
+    def _light_falloff(self, node, output, stack):
+        powers = {"Quadratic": 0, "Linear": 1, "Constant": 2}
+        smooth = self.number(node.inputs["Smooth"], stack, "falloff")
+        self.falloff = self.falloff or falloffs.Falloff(powers[output.name], smooth)
+        return Value(self.number(node.inputs["Strength"], stack, "falloff"))
 
     def _tex_ies(self, node, output, stack):
         if self.ies is not None and self.ies[0] != node:
@@ -67,21 +74,21 @@ class Notes:
 
 
 def emission_of(light, images, report):
-    """Colour times strength of a lamp's own nodes, 1 where it has none; its IES texture, (node, rotation) or None; and what
-    makes a program of the nodes, or None where they are a constant."""
+    """Colour times strength of a lamp's own nodes, 1 where it has none; its IES texture, (node, rotation) or None; what
+    makes a program of the nodes, or None where they are a constant; and its Falloff, or None."""
     if not compat.has_nodes(light):
-        return np.ones(3), None, None
+        return np.ones(3), None, None, None
     told, report = report, Notes()
     reader = LampReader(light.name, images, report)
     output = light.node_tree.get_output_node("CYCLES") or light.node_tree.get_output_node("ALL")
     if output is None:
-        return np.ones(3), None, None
+        return np.ones(3), None, None, None
     node, _, stack = reader.source(output.inputs["Surface"], ())
     if node is None:
-        return np.zeros(3), None, None
+        return np.zeros(3), None, None, None
     if node.type != "EMISSION":
         told.note(f"{light.name} ({node.bl_label})", "Shaders of lamps taken as plain emission")
-        return np.ones(3), None, None
+        return np.ones(3), None, None, None
 
     def at(of_ies):
         reader.of_ies = of_ies
@@ -93,7 +100,7 @@ def emission_of(light, images, report):
     v = at(1.0)
     if reader.ies is not None and not (np.allclose(at(2.0), 2 * v) and np.allclose(at(0.5), 0.5 * v)):
         report.note(light.name, "IES textures that nodes bend, taken as they are")
-    if report.found and reader.ies is None and light.type != "SUN":
+    if report.found and reader.ies is None:
         def compiled(axes, place):
             """What the nodes say of each place or direction; None, with the notes, where that is not known."""
             reader.report = Quiet()
@@ -106,10 +113,10 @@ def emission_of(light, images, report):
                     told.note(*note)
                 return None
 
-        return np.maximum(v, 0), None, compiled
+        return np.maximum(v, 0), None, compiled, reader.falloff
     for note in report.found:
         told.note(*note)
-    return np.maximum(v, 0), reader.ies, None
+    return np.maximum(v, 0), reader.ies, None, reader.falloff
 
 
 class Profiles:
@@ -117,6 +124,7 @@ class Profiles:
 
     def __init__(self, report):
         self.report, self.items = report, []
+        self.falloffs = {}  # (lamp's data, matrix, Falloff) by the id of a converted light
         self._tables, self._numbers = {}, {}
 
     def _table(self, node):
@@ -233,7 +241,25 @@ def _cut_cone(vertical, horizontal, candela, rotation, light, scale):
 def convert_light(name, light, matrix, images, report, profiles, picture_number):
     """[library.Light]: none for one that gives nothing, one of each primary colour for one that throws an image.
     `picture_number`: of a Picture among the scene's."""
-    emission, of_ies, compiled = emission_of(light, images, report)
+    emission, of_ies, compiled, falloff = emission_of(light, images, report)
+    made = _converted(name, light, matrix, images, report, profiles, picture_number, emission, of_ies, compiled)
+    if falloff is not None and not falloff.plain():
+        for part in made:
+            profiles.falloffs[id(part)] = light, matrix.copy(), falloff
+    return made
+
+
+def with_falloffs(lamps, profiles, meshes, report, check):
+    """[(name, library.Light)] of such, in which the distance to `meshes` counts where Light Falloff says so."""
+    made = []
+    for name, lamp in lamps:
+        known = profiles.falloffs.get(id(lamp))
+        made += [(name, lamp)] if known is None else \
+            [(name, part) for part in falloffs.applied(name, lamp, *known, meshes, profiles, report, check)]
+    return made
+
+
+def _converted(name, light, matrix, images, report, profiles, picture_number, emission, of_ies, compiled):
     out = _plain_light(name, light, matrix, emission if compiled is None else np.ones(3), of_ies, report, profiles)
     if out is None:
         return []
@@ -245,7 +271,7 @@ def convert_light(name, light, matrix, images, report, profiles, picture_number)
             out.angle, out.blend, out.spot_cosine = 0.0, 0.0, 0
             if radius > 0:
                 report.note(name, "Stretched spots of a radius, taken as 32 points")
-            return _over_disk(out, radius)
+            return falloffs.spread(out, radius)
         out.radius = radius
     if compiled is None:
         return [out]
@@ -259,6 +285,8 @@ def convert_light(name, light, matrix, images, report, profiles, picture_number)
 
     if expr is None or expr.constant():
         return coloured(emission if expr is None else expr.mean)
+    if light.type == "SUN":
+        return coloured(lamp_textures.of_disc(expr, np.array(out.direction), out.radius))
     if light.type == "AREA":
         colour, picture = lamp_textures.over(expr, m[:, 3], np.array(out.u), np.array(out.v), m[:, 1])
         if picture is not None:
@@ -280,21 +308,6 @@ def convert_light(name, light, matrix, images, report, profiles, picture_number)
                               "textures by direction"):
             part.angle, part.blend, part.spot_cosine = 0.0, 0.0, 0
             lights.append(part)
-    return lights
-
-
-def _over_disk(lamp, radius, count=32):
-    """Lights in place of one of a radius, over the disk across its direction: a table by direction has a place of its own."""
-    if not radius > 0:
-        return [lamp]
-    axis, right = np.array(lamp.direction), np.array(lamp.tangent)
-    up, lights = np.cross(axis, right), []
-    for i in range(count):  # Vogel's spiral
-        r, turn = radius * math.sqrt((i + 0.5) / count), i * math.pi * (3 - math.sqrt(5))
-        part = library.Light.from_buffer_copy(lamp)
-        part.position[:] = (np.array(lamp.position) + r * (math.cos(turn) * right + math.sin(turn) * up)).tolist()
-        part.value = lamp.value / count
-        lights.append(part)
     return lights
 
 

@@ -135,6 +135,43 @@ class LightUnits(unittest.TestCase):
                 self.agree(block=0.12)  # sharp edges run through blocks
                 self.assertEqual(h.last_notes(), [])
 
+    def test_textures_of_suns_are_looked_up_the_way_the_light_goes(self):
+        for rotation, angle, coordinate in (((0.5, 0.3, 0.2), 0.01, ("ShaderNodeTexCoord", "Object")),
+                                            ((0.9, -0.3, 1), 0.2, ("ShaderNodeNewGeometry", "Position")),
+                                            ((0.2, 0.7, 0), 0.05, ("ShaderNodeTexCoord", "Normal"))):
+            with self.subTest(coordinate):
+                self.setUp()
+                lamp = self.textured("SUN", coordinate, "ShaderNodeTexNoise", angle=angle)
+                lamp.rotation_euler, lamp.data.energy = rotation, 3
+                self.agree(block=0.06)
+                self.assertEqual(h.last_notes(), [])
+
+    def test_falloff_by_the_distance_to_what_is_lit(self):
+        for kind, output, smooth, radius in (("POINT", "Linear", 0, 0), ("POINT", "Constant", 0, 0.05), ("SPOT", "Constant", 1, 0),
+                                             ("POINT", "Quadratic", 2, 0), ("SPOT", "Quadratic", 0, 0.3)):
+            with self.subTest(kind=kind, output=output, smooth=smooth):
+                self.setUp()
+                h.add_mesh("Step", [(0, -3, 0.5), (3, -3, 0.5), (3, 3, 0.5), (0, 3, 0.5)], [(0, 1, 2, 3)], h.diffuse((0.3, 0.5, 0.8)))
+                ob = h.add_light(kind, (-0.3, 0.2, 1.7), 50, (0.1, 0.2, 0), shadow_soft_size=radius)
+                ob.data.use_nodes = True
+                tree = ob.data.node_tree
+                node = tree.nodes.new("ShaderNodeLightFalloff")
+                node.inputs["Strength"].default_value, node.inputs["Smooth"].default_value = 1.5, smooth
+                tree.links.new(node.outputs[output], next(n for n in tree.nodes if n.type == "EMISSION").inputs["Strength"])
+                self.agree(block=0.15)  # the step's edge runs through blocks
+                named = [note for note in h.last_notes() if note.startswith("Light Falloff, by how far")]
+                self.assertEqual(len(named), 0 if output == "Quadratic" and not smooth else 1)
+
+    def test_falloff_of_area_lamps_is_that_of_a_mean_distance(self):
+        ob = h.add_light("AREA", (0, 0, 2), 50, size=0.5)
+        ob.data.use_nodes = True
+        tree = ob.data.node_tree
+        node = tree.nodes.new("ShaderNodeLightFalloff")
+        tree.links.new(node.outputs["Linear"], next(n for n in tree.nodes if n.type == "EMISSION").inputs["Strength"])
+        ours, cycles = self._both(256, 4000, 4)
+        a, b = (h.radiance(image)[8:24, 8:24].mean() for image in (ours, cycles))
+        self.assertAlmostEqual(a / b, 1, delta=0.3)
+
     def test_coordinates_that_lamps_do_not_have_are_named(self):
         self.textured("AREA", ("ShaderNodeTexCoord", "Window"), "ShaderNodeTexNoise")
         with h.quiet():
