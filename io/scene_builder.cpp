@@ -9,6 +9,7 @@
 #include "io/file_error.h"
 #include "io/scene_defaults.h"
 #include "io/scene_model.h"
+#include "io/vertex_colours.h"
 
 namespace lumicut::io {
 
@@ -312,6 +313,12 @@ PaintRef SceneBuilder::image_paint(int32_t texture) {
   return paint;
 }
 
+PaintRef SceneBuilder::vertex_paint() {
+  auto paint = std::make_shared<Paint>();
+  paint->kind = Paint::Kind::vertices;
+  return paint;
+}
+
 Vec SceneBuilder::mean_of(const PaintRef& paint) const {
   switch (paint->kind) {
     case Paint::Kind::constant:
@@ -390,6 +397,8 @@ int32_t SceneBuilder::compile(const PaintRef& paint, Program& program) {
       return constant(paint->value[0], paint->value[1], paint->value[2]);
     case Paint::Kind::image:
       return step(LUMICUT_OP_IMAGE, paint->mode, {place()}, static_cast<uint32_t>(paint->texture));
+    case Paint::Kind::vertices:
+      return step(LUMICUT_OP_ATTRIBUTE, 0, {}, VertexColours::kAttribute);
     case Paint::Kind::axis:
       return step(LUMICUT_OP_SEPARATE, paint->mode, {place()});
     case Paint::Kind::along: {
@@ -571,6 +580,19 @@ uint32_t SceneBuilder::variant_of(uint32_t material, const lumicut_material& val
   return add_material(scene.materials[material].name + what, values);
 }
 
+bool SceneBuilder::reads_vertices(uint32_t material) const {
+  const lumicut_material& m = scene.materials.at(material).values;
+  for (const int32_t texture : {m.diffuse_texture, m.specular_texture, m.translucency_texture, m.roughness_texture,
+                                m.metallic_texture, m.opacity_texture, m.emission_texture, m.normal_texture}) {
+    if (texture <= 0) continue;
+    const auto& program = scene.textures.at(static_cast<size_t>(texture) - 1).program;
+    if (program && std::any_of(program->instructions.begin(), program->instructions.end(),
+                               [](const lumicut_instruction& in) { return in.op == LUMICUT_OP_ATTRIBUTE; }))
+      return true;
+  }
+  return false;
+}
+
 void SceneBuilder::add(const std::string& name, const Geometry& geometry, const Affine& place, uint32_t material,
                        bool flipped, const std::string& key, uint32_t mask) {
   for (const double v : place.m)
@@ -597,6 +619,12 @@ void SceneBuilder::add(const std::string& name, const Geometry& geometry, const 
   for (const float x : mesh.positions)
     if (!(std::abs(x) < static_cast<float>(kLargestCoordinate))) fail(name, fmt::format("has a coordinate of {}", x));
   mesh.materials.assign(mesh.indices.size() / 3, material);
+  if (reads_vertices(material)) {
+    if (geometry.colours.empty())
+      approximate(name + " has no colours of vertices and is black");
+    else
+      mesh.attributes.push_back({VertexColours::kAttribute, 3, LUMICUT_OF_VERTICES, geometry.colours});
+  }
   for (const double v : place.m) mesh.transforms.push_back(static_cast<float>(v));
   scene.meshes.push_back(std::move(mesh));
 }
@@ -606,8 +634,14 @@ std::vector<Geometry> SceneBuilder::read_meshes(const std::string& name) {
   if (file.path.empty()) fail("", fmt::format("the mesh {} does not exist", shown(name)));
   if (!has_meshes(file.path)) fail("", fmt::format("the mesh {} is of no format that is read here", shown(name)));
   std::vector<Geometry> out;
-  for (Mesh& mesh : read_model_meshes(file.path, scene.warnings))
-    out.push_back({std::move(mesh.positions), std::move(mesh.normals), std::move(mesh.uvs), std::move(mesh.indices)});
+  for (Mesh& mesh : read_model_meshes(file.path, scene.warnings)) {
+    out.push_back(
+        {std::move(mesh.positions), std::move(mesh.normals), std::move(mesh.uvs), std::move(mesh.indices), {}});
+    // They were taken as sRGB.
+    for (const Attribute& attribute : mesh.attributes)
+      for (const float x : attribute.values)
+        out.back().colours.push_back(x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1 / 2.4f) - 0.055f);
+  }
   return out;
 }
 

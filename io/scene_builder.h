@@ -32,6 +32,7 @@ std::optional<Affine> inverse(const Affine& m);
 struct Geometry {
   std::vector<float> positions, normals, uvs;
   std::vector<uint32_t> indices;
+  std::vector<float> colours{};  // three a vertex, as the file has them; or empty
 };
 // Of radius 1 about the origin, its area that of the sphere; u around z, v from -z (0) to z (1).
 Geometry sphere_geometry();
@@ -58,7 +59,7 @@ struct TexturePlace {
 struct Paint;
 using PaintRef = std::shared_ptr<const Paint>;
 struct Paint {
-  enum class Kind { constant, image, checker, axis, along, behind, product, mix, invert, power, coated };
+  enum class Kind { constant, image, vertices, checker, axis, along, behind, product, mix, invert, power, coated };
   Kind kind = Kind::constant;
   Vec value{0, 0, 0};    // constant; power: the exponent in [0]; along: a direction, whose cosine to the normal it is;
                          // coated: what a coat reflects to its inside in [0]
@@ -101,6 +102,7 @@ class SceneBuilder {
   PaintRef product(const PaintRef& a, const PaintRef& b) const;
   PaintRef mixed(const PaintRef& a, const PaintRef& b, const PaintRef& share) const;
   static PaintRef image_paint(int32_t texture);
+  static PaintRef vertex_paint();  // the colours of meshes' vertices; black where they have none
   // The mean of all texels, as if what is computed of them were linear; of places a half.
   Vec mean_of(const PaintRef& paint) const;
 
@@ -142,6 +144,7 @@ class SceneBuilder {
   int32_t texture_of(const PaintRef& paint);
   int32_t add_program(Program program);
   void hide_emitters();
+  bool reads_vertices(uint32_t material) const;
   // The material of these values, made once of another one.
   uint32_t variant_of(uint32_t material, const lumicut_material& values, const char* what);
   // What set_colour and set_number made these of.

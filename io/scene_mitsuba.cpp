@@ -396,6 +396,8 @@ class Reader {
       // Two squares a unit; the first lies where u and v are 0, which is above.
       for (double& x : out.place.to.m) x *= 2;
       result = build_.made(out);
+    } else if (kind == "mesh_attribute" && word(node, "name", "") == "vertex_color") {
+      result = build_.product(build_.vertex_paint(), constant_paint(number(node, "scale", 1)));
     } else {
       build_.approximate(fmt::format("textures of the kind {} are grey", kind));
       result = constant_paint(0.5);

@@ -295,6 +295,21 @@ class Mitsuba(SceneFiles):
             path = self.write("curves.xml", scene('<shape type="bsplinecurve"><string name="filename" value="curves.txt"/></shape>'))
             self.assert_ends(lumicut("render", path, "-o", self.folder / "x.exr"), BAD_FILE, "curves.txt", said)
 
+    def test_colours_of_vertices_are_linear_as_the_file_has_them(self):
+        corners = ((-9, -9, 0.1, 0.2, 0.9), (9, -9, 0.3, 0.2, 0.9), (9, 9, 0.3, 0.6, 0.9), (-9, 9, 0.1, 0.6, 0.9))
+        self.write("a.ply", "ply\nformat ascii 1.0\nelement vertex 4\n" + "".join(f"property float {n}\n" for n in ("x", "y", "z", "r", "g", "b")) +
+                   "element face 2\nproperty list uchar int vertex_indices\nend_header\n" + "".join(f"{x} {y} 0 {r} {g} {b}\n" for x, y, r, g, b in corners) + "3 0 1 2\n3 0 2 3\n")
+        bsdf = ('<bsdf type="diffuse"><texture type="mesh_attribute" name="reflectance"><string name="name" value="{}"/><float name="scale" value=".5"/></texture></bsdf>').format
+        path = self.write("a.xml", scene(camera((0, 0, 20), (0, 0, 0), 2, (9, 9)), '<emitter type="constant"/>',
+                                         '<shape type="ply"><string name="filename" value="a.ply"/>' + bsdf("vertex_color") + "</shape>"))
+        found, said = self.render(path, "--vpls", 10, layers="albedo")
+        np.testing.assert_allclose(found[4, 4], (0.1, 0.2, 0.45), atol=1e-4)  # the means of the corners, by half
+        self.assertNotIn("warning", said)
+        _, said = self.render(self.write("b.xml", scene(FLOOR.replace("rectangle", "cube").replace('<rgb name="reflectance" value=".5"/>', ""),
+                                                        '<shape type="rectangle">' + bsdf("vertex_color") + "</shape>", '<shape type="disk">' + bsdf("face_color") + "</shape>")), "--vpls", 10)
+        for text in ('shape "rectangle" has no colours of vertices and is black', "kind mesh_attribute are grey"):
+            self.assertIn(text, said)
+
     def test_files_are_searched_for_where_path_says(self):
         (self.folder / "common/parts").mkdir(parents=True)
         (self.folder / "scenes").mkdir()
