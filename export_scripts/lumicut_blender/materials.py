@@ -14,7 +14,7 @@ from . import compat, volumes
 from .lumicut import library
 from .images import Images, Picture, image_of
 from .mappings import Mapping, aligned
-from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Value, input_of
+from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Value, fresnel, input_of
 from .programs import NORMAL, CannotCompile, Compiler, ProgramPicture, of_picture, program_of, bump_of
 
 HOLE = 1e-3  # an opacity that the library takes as "not there"; 0 means 1 to it
@@ -99,6 +99,7 @@ class Surface:
     emission: Value = ZERO
     opacity: Value = ONE
     clear: bool = False  # lets light pass, and does nothing else
+    filter: Value = ONE  # colour of what passes where it is clear
     holdout: bool = False  # the camera sees a hole
     shadows_pass: bool = False  # glass that does not stop shadow rays
     rough_picture: Value = None  # `roughness` is its mean then
@@ -116,6 +117,33 @@ def cut_of(factor, picture):
         return 0.0
     colours = factor if picture is None else factor * picture.linear()
     return float(np.maximum(colours - 1, 0).mean() / max(colours.mean(), 1e-9))
+
+
+def is_tinted(surface):
+    return surface.clear and bool((surface.filter.mean() < 0.99).any())
+
+
+def filtering(surface, reader):
+    """A Transparent BSDF: glass that bends and reflects nothing, straight through which light shines."""
+    if is_tinted(surface):
+        reader.note("", "Coloured transparency, whose shadows are grey")
+    return Surface(glass=reader.multiply(surface.filter, surface.filter), ior=1.0, roughness=0.0, shadows_pass=True,
+                   tint=tuple(surface.filter.mean()), by_ray=surface.by_ray)
+
+
+def only_gloss(surface):
+    """Whether a surface reflects as a mirror or a gloss does, and does nothing else."""
+    others = ("diffuse", "glass", "coat", "translucency", "emission")
+    return luminance(surface.gloss) + luminance(surface.metal) > 0 and all(luminance(getattr(surface, slot)) <= 0 for slot in others)
+
+
+def index_like(share):
+    """Index of refraction whose reflectance, of light from all sides, is that of a picture by view, seen from the front."""
+    seen = share.factor.mean() * share.picture.linear()[0, share.picture.linear().shape[1] // 2:].mean(-1)
+    cosine = np.linspace(0, 1, len(seen))
+    indices = np.linspace(1.02, 6, 250)
+    means = [(fresnel(cosine, index) * cosine).mean() for index in indices]
+    return float(indices[np.abs(np.array(means) - (seen * cosine).mean()).argmin()])
 
 
 def luminance(value):
@@ -204,7 +232,10 @@ class SurfaceReader(Evaluator):
         if a.clear or b.clear:  # a cut-out: what is there keeps its colour
             kept, share = (b, f) if a.clear else (a, rest)
             if a.clear and b.clear:
-                return a
+                return dataclasses.replace(a, filter=self.add(self.multiply(rest, a.filter), self.multiply(f, b.filter)))
+            if share.picture is not None and share.picture.is_by_view() and only_gloss(kept):
+                return dataclasses.replace(filtering(b if kept is a else a, self), clearcoat=ClearCoat(1.0, kept.roughness, index_like(share)))
+            self.taken_as_clear(a if a.clear else b)
             return dataclasses.replace(kept, opacity=self.multiply(share, kept.opacity), shadows_pass=shadows_pass or kept.shadows_pass)
         return self.weighted(rest, a, f, b)
 
@@ -217,6 +248,9 @@ class SurfaceReader(Evaluator):
 
     def closure_add_shader(self, node, stack):
         a, b = self.surface(node.inputs[0], stack), self.surface(node.inputs[1], stack)
+        for surface in (a, b):
+            if surface.clear:
+                self.taken_as_clear(surface)
         if a.clear:
             return dataclasses.replace(b, opacity=ONE)
         if b.clear:
@@ -334,9 +368,12 @@ class SurfaceReader(Evaluator):
     closure_background = closure_emission
 
     def closure_bsdf_transparent(self, node, stack):
-        if (self.value(node.inputs["Color"], stack).mean() < 0.99).any():
+        return Surface(opacity=ZERO, clear=True, filter=self.value(node.inputs["Color"], stack))
+
+    def taken_as_clear(self, surface):
+        """What is mixed with other shaders is a hole."""
+        if is_tinted(surface):
             self.note("Transparent BSDF", "Coloured transparency, taken as clear")
-        return Surface(opacity=ZERO, clear=True)
 
     def closure_holdout(self, node, stack):
         if self.ray == "camera":
@@ -784,6 +821,8 @@ class Materials:
             self._displace(reader, material, output.inputs["Displacement"])
         # Outputs inside a group cannot be: the output stands in the tree itself.
         surface = reader.surface(output.inputs["Surface"])
+        if is_tinted(surface):
+            surface = filtering(surface, reader)
         if output.inputs["Volume"].is_linked:
             if not output.inputs["Surface"].is_linked:
                 surface = Surface(opacity=ZERO, clear=True)  # no surface: rays pass

@@ -183,6 +183,52 @@ class Materials(unittest.TestCase):
             np.testing.assert_allclose(ours["Combined"].mean((0, 1)), theirs["Combined"].mean((0, 1)), rtol=0.08)
             self.assertTrue(any("Bump Map Correction" in note for note in h.last_notes()))
 
+    def panes(self, shader):
+        """A floor half under a pane that `shader` makes of its tree, seen from above: Cycles' means of both halves and ours."""
+        scene = h.new_scene(32, 32)
+        h.set_world((0.3, 0.3, 0.3))
+        h.add_plane(4, material=h.diffuse((0.8, 0.8, 0.8), "floor"))
+        m = h.material("pane")
+        shader(m)
+        h.add_mesh("Pane", [(0, -2, 0.5), (2, -2, 0.5), (2, 2, 0.5), (0, 2, 0.5)], [(0, 1, 2, 3)], m)
+        h.add_light("SUN", energy=2, angle=0.1, rotation=(0.6, 0, 0))
+        scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 3
+        with h.quiet():
+            h.set_cycles(256, 6)
+            scene.cycles.blur_glossy = 0
+            theirs = h.radiance(h.render())
+            h.set_lumicut("lightcuts", 4, passes=8, vpls=2000, compensate=True)
+            ours = h.radiance(h.render())
+        return [[image[:, part].mean((0, 1)) for part in (slice(0, 14), slice(18, 32))] for image in (ours, theirs)]
+
+    def test_coloured_transparency_filters_what_is_seen_and_dims_its_shadow(self):
+        colour = np.array((0.8, 0.4, 0.2))
+
+        def stained(m):
+            h.shader(m, "ShaderNodeBsdfTransparent", Color=(*colour, 1))
+
+        ours, theirs = self.panes(stained)
+        luminance = np.array((0.2126, 0.7152, 0.0722))
+        for a, b, most in zip(ours, theirs, (0.03, 0.13)):  # of a colour twice, the grey shadow has the mean once
+            self.assertAlmostEqual(a @ luminance / (b @ luminance), 1, delta=most)
+        self.assertTrue(any("whose shadows are grey" in note for note in h.last_notes()))
+        # What is seen through it has its colour once.
+        np.testing.assert_allclose(ours[1] / ours[1].max(), colour / colour.max(), atol=0.05)
+
+    def test_panes_made_of_gloss_and_transparency_by_fresnel(self):
+        def made(m):
+            tree = m.node_tree
+            mix, clear, gloss, by = h.shader(m, "ShaderNodeMixShader"), *(tree.nodes.new(f"ShaderNode{kind}") for kind in (
+                "BsdfTransparent", "BsdfGlossy", "Fresnel"))
+            gloss.inputs["Roughness"].default_value = 0.0
+            clear.inputs["Color"].default_value = (0.7, 0.9, 0.8, 1)
+            for socket, source in enumerate((by, clear, gloss)):
+                tree.links.new(source.outputs[0], mix.inputs[socket])
+
+        ours, theirs = self.panes(made)
+        for a, b in zip(ours, theirs):
+            self.assertAlmostEqual(a.mean() / b.mean(), 1, delta=0.04)
+
     def test_rough_clear_coats_are_as_bright_in_all_methods_as_path_traced(self):
         """A coat is a second point of its pixel to the methods that sum lights, and a choice to paths."""
         h.new_scene(48, 48)
