@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_invoke.h>
 
+#include <numbers>
 #include <numeric>
 
 #include "core/parallel.h"
@@ -15,9 +16,13 @@ struct Splitter {
   std::vector<uint32_t>& order;
   float scale[6];
   Progress& progress;
+  const std::vector<float>* reflectance = nullptr;  // diffuse and specular, or not compared
+  float per_reflectance = 0.0f;
 
   const float* feature(int axis) const {
-    return axis < 3 ? batch.position[axis].data() : batch.normal[axis - 3].data();
+    return axis < 3   ? batch.position[axis].data()
+           : axis < 6 ? batch.normal[axis - 3].data()
+                      : reflectance[axis - 6].data();
   }
 
   // Splits [begin, end) until every leaf stands alone. What a node becomes depends on its points, never on who does it.
@@ -27,11 +32,12 @@ struct Splitter {
     if (n > PointTree::kRegion) progress.check();
     int widest = 0;
     float low = 0.0f, high = -1.0f, width = -1.0f;
-    for (int a = 0; a < 6; ++a) {
+    for (int a = 0; a < (reflectance != nullptr ? 8 : 6); ++a) {
       const float* f = feature(a);
+      const float per = a < 6 ? scale[a] : per_reflectance;
       float lo = std::numeric_limits<float>::infinity(), hi = -lo;
       for (size_t i = begin; i < end; ++i) lo = std::min(lo, f[order[i]]), hi = std::max(hi, f[order[i]]);
-      if ((hi - lo) * scale[a] > width) widest = a, low = lo, high = hi, width = (hi - lo) * scale[a];
+      if ((hi - lo) * per > width) widest = a, low = lo, high = hi, width = (hi - lo) * per;
     }
     // The middle of the axis, on the nearest multiple of what a child of this node's level holds.
     size_t granule = PointTree::kLeaf;
@@ -56,14 +62,24 @@ struct Splitter {
 
 }  // namespace
 
-PointTree PointTree::build(const ShadePoints& batch, float length, Progress& progress) {
+PointTree PointTree::build(const ShadePoints& batch, float length, Progress& progress, float material) {
   PointTree tree;
   const size_t n = batch.size();
   if (n == 0) return tree;
   tree.order.resize(n);
   std::iota(tree.order.begin(), tree.order.end(), 0u);
   const float per_length = length > 0.0f ? 1.0f / length : 0.0f;
-  Splitter{batch, tree.order, {per_length, per_length, per_length, 1, 1, 1}, progress}.split(0, n);
+  Splitter splitter{batch, tree.order, {per_length, per_length, per_length, 1, 1, 1}, progress};
+  std::vector<float> reflectance[2];
+  if (material > 0.0f) {
+    for (size_t i = 0; i < n; ++i) {
+      const SurfacePoint p = batch.get(i);
+      reflectance[0].push_back(luminance(p.diffuse) * std::numbers::pi_v<float>);
+      reflectance[1].push_back(luminance(p.specular));
+    }
+    splitter.reflectance = reflectance, splitter.per_reflectance = material;
+  }
+  splitter.split(0, n);
   progress.check();
 
   tree.points.reserve(n);

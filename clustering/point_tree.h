@@ -28,8 +28,9 @@ struct PointTree {
 
   // Positions are compared in units of `length`, the distance that counts as much as normals a right angle apart:
   // a sixteenth of the scene's diagonal serves (Walter et al. 2008, sec. 5, for lights). Runs on the caller's arena.
+  // `material`: weight of diffuse and specular reflectance, of which a difference of 1 counts as so many right angles.
   // Throws Error(cancelled).
-  static PointTree build(const ShadePoints& batch, float length, Progress& progress);
+  static PointTree build(const ShadePoints& batch, float length, Progress& progress, float material = 0.0f);
 };
 
 }  // namespace lumicut

@@ -64,12 +64,16 @@ std::vector<float> IlluminationCut::coarse_image(const PointTree& points, ShadeC
   std::vector<float> coarse(round_up_to_lanes(points.size()));
   for (size_t i = 0; i < points.size(); ++i)
     coarse[i] = (leaf[i / kLeaf] + group[i / kGroup]) * reflectance(points.points.get(i));
-  double mean = 0.0;
-  for (size_t i = 0; i < points.size(); ++i) mean += coarse[i];
-  // Black points would ask for every light; nobody sees a small share of the mean.
-  const auto least = static_cast<float>(floor_ * mean / static_cast<double>(points.size()));
-  for (size_t i = 0; i < points.size(); ++i) coarse[i] = std::max(coarse[i], least);
+  floor_dark(points.size(), coarse);
   return coarse;
+}
+
+void IlluminationCut::floor_dark(size_t count, std::vector<float>& coarse) const {
+  double mean = 0.0;
+  for (size_t i = 0; i < count; ++i) mean += coarse[i];
+  // Black points would ask for every light; nobody sees a small share of the mean.
+  const auto least = static_cast<float>(floor_ * mean / static_cast<double>(count));
+  for (size_t i = 0; i < count; ++i) coarse[i] = std::max(coarse[i], least);
 }
 
 void IlluminationCut::push_children(uint32_t node, uint32_t lanes, std::vector<RegionItem>& stack) const {

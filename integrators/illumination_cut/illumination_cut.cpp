@@ -11,6 +11,9 @@ void IlluminationCut::prepare(const Scene& scene, const VplSet& vpls, const Para
   error_ = own.error;
   floor_ = own.dark_floor;
   visibility_ = own.visibility;
+  refine_coarse_ = own.refine_coarse;
+  shadow_a_pixel_ = own.shadow_a_pixel;
+  material_weight_ = own.material_weight;
   stochastic_ = own.representative == Representation::stochastic;
   seed_ = params.common().seed;
   separation2_ = own.coarse_separation * own.coarse_separation;
@@ -112,18 +115,31 @@ void IlluminationCut::shade_batch(const ShadePoints& batch, std::span<Rgb> radia
   PointTree points;
   {
     const PhaseTimer timer(context.stats, "point tree");
-    points = PointTree::build(batch, scene_->extent().radius() / 8.0f, context.progress);
+    points = PointTree::build(batch, scene_->extent().radius() / 8.0f, context.progress, material_weight_);
   }
   std::vector<float> coarse;
   {
     const PhaseTimer timer(context.stats, "coarse image");
     coarse = coarse_image(points, context);
   }
+  // By pairs of a larger error, as a sharper image of what is bright and dark.
+  for (uint32_t round = refine_coarse_; round > 0; --round) {
+    const PhaseTimer timer(context.stats, "coarse image");
+    add_pairs(points, coarse, error_ * std::ldexp(1.0f, 2 * static_cast<int>(round)), radiance, {}, context);
+    if (context.progress.cancelled()) return;
+    for (size_t i = 0; i < points.size(); ++i) coarse[i] = luminance(radiance[points.order[i]]);
+    floor_dark(points.size(), coarse);
+  }
   const PhaseTimer timer(context.stats, "pairs");
+  add_pairs(points, coarse, error_, radiance, counts, context);
+}
+
+void IlluminationCut::add_pairs(const PointTree& points, const std::vector<float>& coarse, float error,
+                                std::span<Rgb> radiance, std::span<PointCounts> counts, ShadeContext context) const {
   parallel_chunks(points.region_count(), 1, [&](size_t region, size_t) {
     if (context.progress.cancelled()) return;
     const auto work = std::make_unique<Workspace>();
-    start_region(points, region, coarse, *work);
+    start_region(points, region, coarse, error, *work);
     region_pairs(points, region, *work, context.progress);
     const size_t first = region * kRegion, n = std::min(kRegion, points.size() - first);
     for (size_t i = 0; i < n; ++i) {
@@ -137,7 +153,7 @@ void IlluminationCut::shade_batch(const ShadePoints& batch, std::span<Rgb> radia
                            static_cast<float>(work->group_bounds[i / kGroup]) / static_cast<float>(kGroup);
       counts[at] = {work->clusters[i], work->rays[i], static_cast<uint32_t>(std::ceil(bounds))};
     }
-    work->total.points = n;
+    work->total.points = error == error_ ? n : 0;  // counted once, in the last round
     context.stats.add(work->total);
   });
 }
@@ -158,9 +174,9 @@ ParamTable params() {
           "of the radiance", 0, 1),
       choice<&P::visibility>(
           "visibility", "Visibility",
-          "full: every shadow ray; sampling: few rays a pair, more where they disagree; unbiased: as sampling, with "
-          "random corrections",
-          "", "full|sampling|unbiased"),
+          "full: every shadow ray; sampling: few rays a pair, all where they disagree; recursive: there few again, of "
+          "each run of points (Alg. 5); unbiased: as sampling, with random corrections",
+          "", "full|sampling|recursive|unbiased"),
       choice<&P::representative>(
           "representative", "Representative",
           "What stands for a cluster of lights. mean: their mean shines, one drawn for each pair casts shadows; "
@@ -172,7 +188,16 @@ ParamTable params() {
       number<&P::coarse_separation>(
           "coarse_separation", "Coarse separation",
           "Coarse image: largest cluster that is taken as one, seen from its partner; smaller is slower and surer",
-          "of the distance", 0.001, 1));
+          "of the distance", 0.001, 1),
+      number<&P::refine_coarse>("refine_coarse", "Refine coarse",
+                                "Times that the coarse image is made anew by pairs, of four times the error and more",
+                                "", 0, 4),
+      flag<&P::shadow_a_pixel>("shadow_a_pixel", "Shadow a pixel",
+                               "Samples of one pixel share a shadow ray in each pair"),
+      number<&P::material_weight>(
+          "material_weight", "Material weight",
+          "How much points of unlike reflectance are held apart in the point tree, beside normals a right angle apart",
+          "", 0, 100));
 }
 
 }  // namespace

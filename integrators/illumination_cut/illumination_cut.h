@@ -22,7 +22,7 @@ namespace lumicut::illumination_cut {
 inline constexpr size_t kLeaf = PointTree::kLeaf, kGroup = PointTree::kGroup, kRegion = PointTree::kRegion;
 static_assert(kGroup == kMaxLit);
 
-enum class Visibility { full, sampling, unbiased };
+enum class Visibility { full, sampling, recursive, unbiased };
 enum class Representation { mean, random, stochastic };
 
 struct IlluminationCutParams {
@@ -30,6 +30,9 @@ struct IlluminationCutParams {
   Visibility visibility = Visibility::sampling;
   Representation representative = Representation::mean;
   float dark_floor = 0.01f, coarse_separation = 0.15f;
+  uint32_t refine_coarse = 0;  // times that the coarse image is made anew by pairs
+  bool shadow_a_pixel = false;
+  float material_weight = 0.0f;
 };
 
 // Which points of a group are meant, a bit each.
@@ -50,6 +53,9 @@ struct Workspace {
   LitPoints lit;
   float weight[kMaxLit];  // visibility of the lit points, or its estimate
   uint8_t known[kMaxLit];
+  // Those of them whose shadows are asked for, and for each the one that stands for it.
+  uint32_t own[kMaxLit], stands[kMaxLit];
+  size_t own_count = 0;
   // Points that are asked for at once.
   float x[kMaxLit + kLanes], y[kMaxLit + kLanes], z[kMaxLit + kLanes];
   uint32_t asked[kMaxLit];
@@ -101,6 +107,7 @@ class IlluminationCut final : public Integrator {
 
   // Luminance of each point, roughly.
   std::vector<float> coarse_image(const PointTree& points, ShadeContext context) const;
+  void floor_dark(size_t count, std::vector<float>& coarse) const;
 
   void push_children(uint32_t node, uint32_t lanes, std::vector<RegionItem>& stack) const;
 
@@ -112,9 +119,14 @@ class IlluminationCut final : public Integrator {
 
   // ---- Phase II: the pairs. [thesis Alg. 4] ----
 
-  void start_region(const PointTree& points, size_t region, const std::vector<float>& coarse, Workspace& work) const;
+  void start_region(const PointTree& points, size_t region, const std::vector<float>& coarse, float error,
+                    Workspace& work) const;
 
   void region_pairs(const PointTree& points, size_t region, Workspace& work, const Progress& progress) const;
+
+  // All pairs of a batch: their light, and what they cost, which are empty or as long as the batch.
+  void add_pairs(const PointTree& points, const std::vector<float>& coarse, float error, std::span<Rgb> radiance,
+                 std::span<PointCounts> counts, ShadeContext context) const;
 
   static GroupLanes lanes_of(const PointTree& points, size_t region, size_t group);
 
@@ -136,13 +148,19 @@ class IlluminationCut final : public Integrator {
 
   static constexpr size_t kSampleFrom = 8;
 
-  static void ask(uint32_t i, Workspace& work);
+  // Fills `own` and `stands`: all lit points, or one of each pixel. [thesis sec. 3.3, "Anti-aliasing"]
+  void choose_own(const PointTree& points, size_t first, Workspace& work) const;
+
+  static void ask(uint32_t own, Workspace& work);
 
   void answer(const Vpl& light, size_t base, Workspace& work) const;
 
   // Fills `weight` from few rays: one of each of 8 to 32 equal runs of points, and all where they disagree. Packets of
   // neighbours cost so little beside packets of spread samples that a second round of samples does not pay.
   void sample_visibility(const Vpl& light, size_t base, uint32_t index, size_t first, Workspace& work) const;
+
+  // As printed: 8 or 16 rays of as many runs, and each run again where they disagree.
+  void sample_recursively(const Vpl& light, size_t base, uint32_t begin, uint32_t end, Rng& rng, Workspace& work) const;
 
   // What was inferred is a control variate: some of it is traced, and its error taken off as often more.
   void correct(const Vpl& light, size_t base, float inferred, Rng& rng, Workspace& work) const;
@@ -159,9 +177,10 @@ class IlluminationCut final : public Integrator {
   };
   std::vector<Mean> means_;  // a node; empty: the tree's own representatives serve
   Falloff falloff_;
-  float error_ = 0.02f, floor_ = 0.01f, separation2_ = 0.0225f;
+  float error_ = 0.02f, floor_ = 0.01f, separation2_ = 0.0225f, material_weight_ = 0.0f;
   Visibility visibility_ = Visibility::sampling;
-  bool stochastic_ = false;
+  uint32_t refine_coarse_ = 0;
+  bool stochastic_ = false, shadow_a_pixel_ = false;
   uint64_t seed_ = 1;
 };
 

@@ -6,7 +6,7 @@
 namespace lumicut::illumination_cut {
 
 void IlluminationCut::start_region(const PointTree& points, size_t region, const std::vector<float>& coarse,
-                                   Workspace& work) const {
+                                   float error, Workspace& work) const {
   for (auto& channel : work.sum) std::fill(channel, channel + kRegion, 0.0f);
   std::fill(work.clusters, work.clusters + kRegion, 0u);
   std::fill(work.rays, work.rays + kRegion, 0u);
@@ -19,7 +19,7 @@ void IlluminationCut::start_region(const PointTree& points, size_t region, const
   std::fill(work.leaf_allowed, work.leaf_allowed + kRegion / kLeaf, none);
   std::fill(work.group_allowed, work.group_allowed + kLanes, none);
   for (size_t i = 0; i < n; ++i) {
-    const float allowed = error_ * coarse[first + i];
+    const float allowed = error * coarse[first + i];
     work.allowed[i] = allowed;
     work.leaf_allowed[i / kLeaf] = std::min(work.leaf_allowed[i / kLeaf], allowed);
     work.group_allowed[i / kGroup] = std::min(work.group_allowed[i / kGroup], allowed);
@@ -173,15 +173,15 @@ void IlluminationCut::add_light(const PointTree& points, size_t region, size_t g
     Rng rng(seed_, Stage::representative, (uint64_t{points.points.pixel[first]} << 32) | first, index);
     seen = &draw(index, points.points.position_at(middle), points.points.normal_at(middle), rng.next_float());
   }
-  if (visibility_ == Visibility::full || shadow == Shadow::exact || lit.count < kSampleFrom) {
-    trace_lit(scene_->accel(), *seen, lit);
-    for (size_t i = 0; i < lit.count; ++i) {
-      work.weight[i] = lit.occluded[i] ? 0.0f : 1.0f;
-      ++work.rays[base + lit.index[i]];
-    }
+  choose_own(points, first, work);
+  if (visibility_ == Visibility::full || shadow == Shadow::exact || work.own_count < kSampleFrom) {
+    for (uint32_t k = 0; k < work.own_count; ++k) ask(k, work);
+    answer(*seen, base, work);
   } else {
     sample_visibility(*seen, base, index, first, work);
   }
+  if (work.own_count < lit.count)
+    for (size_t i = 0; i < lit.count; ++i) work.weight[i] = work.weight[work.stands[i]];
   for (size_t i = 0; i < lit.count; ++i) {
     const size_t at = base + lit.index[i];
     if (work.weight[i] == 0.0f) continue;
@@ -192,8 +192,29 @@ void IlluminationCut::add_light(const PointTree& points, size_t region, size_t g
   }
 }
 
-void IlluminationCut::ask(uint32_t i, Workspace& work) {
+void IlluminationCut::choose_own(const PointTree& points, size_t first, Workspace& work) const {
+  const auto n = static_cast<uint32_t>(work.lit.count);
+  work.own_count = 0;
+  if (!shadow_a_pixel_) {
+    for (uint32_t i = 0; i < n; ++i) work.own[i] = i;
+    work.own_count = n;
+    return;
+  }
+  constexpr uint32_t kSlots = 2 * kMaxLit;
+  uint16_t slots[kSlots] = {};  // by pixel: one more than the lit point that stands for it
+  for (uint32_t i = 0; i < n; ++i) {
+    const uint32_t pixel = points.points.pixel[first + work.lit.index[i]];
+    uint32_t slot = (pixel * 2654435761u) % kSlots;
+    while (slots[slot] != 0 && points.points.pixel[first + work.lit.index[slots[slot] - 1u]] != pixel)
+      slot = (slot + 1) % kSlots;
+    if (slots[slot] == 0) slots[slot] = static_cast<uint16_t>(i + 1), work.own[work.own_count++] = i;
+    work.stands[i] = slots[slot] - 1u;
+  }
+}
+
+void IlluminationCut::ask(uint32_t own, Workspace& work) {
   const size_t k = work.asked_count++;
+  const uint32_t i = work.own[own];
   work.asked[k] = i;
   work.x[k] = work.lit.x[i], work.y[k] = work.lit.y[i], work.z[k] = work.lit.z[i];
 }
@@ -211,10 +232,11 @@ void IlluminationCut::answer(const Vpl& light, size_t base, Workspace& work) con
 
 void IlluminationCut::sample_visibility(const Vpl& light, size_t base, uint32_t index, size_t first,
                                         Workspace& work) const {
-  const auto n = static_cast<uint32_t>(work.lit.count);
+  const auto n = static_cast<uint32_t>(work.own_count);
   const uint32_t runs = n > 128 ? 32 : n > 32 ? 16 : 8;
-  std::fill(work.known, work.known + n, uint8_t{0});
+  std::fill(work.known, work.known + work.lit.count, uint8_t{0});
   Rng rng(seed_, Stage::visibility, first, index);
+  if (visibility_ == Visibility::recursive) return sample_recursively(light, base, 0, n, rng, work);
   uint32_t samples[32];
   const auto run_begin = [&](uint32_t r) { return r * n / runs; };
   for (uint32_t r = 0; r < runs; ++r) {
@@ -222,23 +244,51 @@ void IlluminationCut::sample_visibility(const Vpl& light, size_t base, uint32_t 
     ask(samples[r], work);
   }
   answer(light, base, work);
-  const float seen = work.weight[samples[0]];
+  const float seen = work.weight[work.own[samples[0]]];
   bool agree = true;
-  for (uint32_t r = 1; r < runs; ++r) agree = agree && work.weight[samples[r]] == seen;
+  for (uint32_t r = 1; r < runs; ++r) agree = agree && work.weight[work.own[samples[r]]] == seen;
   if (!agree) {
-    for (uint32_t i = 0; i < n; ++i)
-      if (!work.known[i]) ask(i, work);
+    for (uint32_t k = 0; k < n; ++k)
+      if (!work.known[work.own[k]]) ask(k, work);
     if (work.asked_count > 0) answer(light, base, work);
     return;
   }
-  std::fill(work.weight, work.weight + n, seen);
+  std::fill(work.weight, work.weight + work.lit.count, seen);
   if (visibility_ == Visibility::unbiased) correct(light, base, seen, rng, work);
 }
 
+void IlluminationCut::sample_recursively(const Vpl& light, size_t base, uint32_t begin, uint32_t end, Rng& rng,
+                                         Workspace& work) const {
+  const uint32_t n = end - begin;
+  const auto unknown = [&](uint32_t k) { return !work.known[work.own[k]]; };
+  if (n < kSampleFrom) {
+    for (uint32_t k = begin; k < end; ++k)
+      if (unknown(k)) ask(k, work);
+    if (work.asked_count > 0) answer(light, base, work);
+    return;
+  }
+  const uint32_t runs = n > 32 ? 16 : 8;
+  uint32_t samples[16];
+  const auto run_begin = [&](uint32_t r) { return begin + r * n / runs; };
+  for (uint32_t r = 0; r < runs; ++r) {
+    samples[r] = run_begin(r) + rng.next_below(run_begin(r + 1) - run_begin(r));
+    if (unknown(samples[r])) ask(samples[r], work);
+  }
+  if (work.asked_count > 0) answer(light, base, work);
+  const float seen = work.weight[work.own[samples[0]]];
+  bool agree = true;
+  for (uint32_t r = 1; r < runs; ++r) agree = agree && work.weight[work.own[samples[r]]] == seen;
+  if (!agree) {
+    for (uint32_t r = 0; r < runs; ++r) sample_recursively(light, base, run_begin(r), run_begin(r + 1), rng, work);
+    return;
+  }
+  for (uint32_t k = begin; k < end; ++k)
+    if (unknown(k)) work.weight[work.own[k]] = seen;
+}
+
 void IlluminationCut::correct(const Vpl& light, size_t base, float inferred, Rng& rng, Workspace& work) const {
-  const auto n = static_cast<uint32_t>(work.lit.count);
-  for (uint32_t i = 0; i < n; ++i)
-    if (!work.known[i] && rng.next_below(kCorrectOneIn) == 0) ask(i, work);
+  for (uint32_t k = 0; k < work.own_count; ++k)
+    if (!work.known[work.own[k]] && rng.next_below(kCorrectOneIn) == 0) ask(k, work);
   const size_t asked = work.asked_count;
   if (asked == 0) return;
   answer(light, base, work);

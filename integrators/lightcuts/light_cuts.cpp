@@ -116,7 +116,7 @@ template <bool kRecord>
 void AddNode(const LightTree& tree, const Accel& accel, const CutOptions& o, uint32_t node_index,
              const uint16_t* active, const CutEntry* parent, LightCuts& cuts) {
   const D d;
-  const V zero = hn::Zero(d);
+  const V zero = hn::Zero(d), floor = hn::Set(d, std::max(o.floor, 1e-30f));
   const LightNode& node = tree.node(node_index);
   const uint32_t index = cuts.allocate();
   CutEntry& e = cuts.entry(index);
@@ -179,7 +179,7 @@ void AddNode(const LightTree& tree, const Accel& accel, const CutOptions& o, uin
         for (size_t k = 0; leaf && k < 3; ++k)
           hn::Store(hn::Add(hn::Load(d, cuts.radiance[k][g] + i), est[k]), d, cuts.radiance[k][g] + i);
       }
-      const V ratio = hn::Div(hn::Load(d, e.bound[g] + i), hn::Max(total, hn::Set(d, 1e-30f)));
+      const V ratio = hn::Div(hn::Load(d, e.bound[g] + i), hn::Max(total, floor));
       excess = hn::Max(excess, hn::IfThenElseZero(mask, ratio));
     }
   }
@@ -199,7 +199,7 @@ HWY_INLINE void Refine(const LightTree& tree, const Accel& accel, const CutOptio
                        LightCuts& cuts) {
   const D d;
   const DU du;
-  const V zero = hn::Zero(d), error = hn::Set(d, o.error);
+  const V zero = hn::Zero(d), error = hn::Set(d, o.error), floor = hn::Set(d, o.floor);
   const CutEntry& e = cuts.entry(index);
   const LightNode* children = &tree.node(e.first_child);
   __builtin_prefetch(children), __builtin_prefetch(reinterpret_cast<const char*>(children) + 64);
@@ -212,7 +212,8 @@ HWY_INLINE void Refine(const LightTree& tree, const Accel& accel, const CutOptio
     for (size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
       const V total = hn::Load(d, cuts.luminance[g] + i);
       const auto cut = hn::Load(du, cuts.clusters[g] + i);
-      auto wanted = hn::And(MaskOf(d, e.active[g], i), hn::Gt(hn::Load(d, e.bound[g] + i), hn::Mul(error, total)));
+      auto wanted = hn::And(MaskOf(d, e.active[g], i),
+                            hn::Gt(hn::Load(d, e.bound[g] + i), hn::Mul(error, hn::Max(total, floor))));
       wanted = hn::And(wanted, hn::RebindMask(d, hn::Lt(cut, hn::Set(du, o.max_cut))));
       const auto one = hn::IfThenElseZero(hn::RebindMask(du, wanted), hn::Set(du, 1));
       hn::Store(hn::Sub(cut, one), du, cuts.clusters[g] + i);

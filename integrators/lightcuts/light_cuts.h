@@ -33,6 +33,7 @@ struct CutRecord {
 struct CutOptions {
   Falloff falloff;
   float error = 0.02f;  // largest share of a point's luminance that a cluster's bound may reach
+  float floor = 0.0f;   // points of less luminance count as of this one
   uint32_t max_cut = 0xffffffffu;
   uint32_t slot = 0;                   // of LightTree::representative
   const Progress* progress = nullptr;  // where it is cancelled, the cuts are left as they are

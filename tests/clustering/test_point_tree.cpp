@@ -57,6 +57,31 @@ TEST(PointTree, HoldsEveryPointOnceAndEveryLaneItsPoints) {
   }
 }
 
+TEST(PointTree, HoldsUnlikeMaterialsApartWhereTheyWeigh) {
+  Rng rng(3, Stage::test, 22);
+  const ShadePoints random = test::random_points(rng, 512, 1.0f, true);
+  ShadePoints batch;
+  for (size_t i = 0; i < random.size(); ++i) {
+    SurfacePoint p = random.get(i);
+    p.normal = {0, 0, 1}, p.specular = {}, p.diffuse = i % 2 == 0 ? Rgb{0.05f, 0.05f, 0.05f} : Rgb{0.3f, 0.3f, 0.3f};
+    batch.push(p);
+  }
+  batch.finish();
+  Progress progress;
+  const auto mixed_leaves = [&](float material) {
+    const PointTree tree = PointTree::build(batch, 1.0f, progress, material);
+    size_t mixed = 0;
+    for (size_t leaf = 0; leaf < tree.leaf_count(); ++leaf) {
+      size_t dark = 0;
+      for (size_t i = 0; i < 16; ++i) dark += tree.points.get(leaf * 16 + i).diffuse.x < 0.1f;
+      mixed += dark != 0 && dark != 16;
+    }
+    return mixed;
+  };
+  EXPECT_GT(mixed_leaves(0.0f), 24u);   // of 32: nothing is known of them
+  EXPECT_EQ(mixed_leaves(100.0f), 0u);  // two halves of 256
+}
+
 TEST(PointTree, KeepsWallsThatFaceEachOtherApart) {
   // Two parallel planes a hair apart, points in random order: no full leaf may hold both sides.
   Rng rng(1, Stage::test, 22);

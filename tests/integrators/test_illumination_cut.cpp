@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "tests/support/render.h"
@@ -16,10 +18,14 @@ TEST(IlluminationCut, EqualsExhaustiveAtNoErrorWhateverItsModes) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 3000);
   const auto reference = test::render(*scene, "exhaustive", vpls, {});
-  for (const char* visibility : {"full", "sampling", "unbiased"})
+  for (const char* visibility : {"full", "sampling", "recursive", "unbiased"})
     for (const char* representative : {"mean", "stochastic"}) {
       const auto frame = test::render(*scene, kId, vpls,
-                                      {{"error", "0"}, {"visibility", visibility}, {"representative", representative}});
+                                      {{"error", "0"},
+                                       {"visibility", visibility},
+                                       {"representative", representative},
+                                       {"refine_coarse", "1"},
+                                       {"material_weight", "1"}});
       // Single lights are traced whole: the order of summation alone is left.
       EXPECT_LT(test::mean_relative_error(frame.radiance, reference.radiance), 1e-5) << visibility << representative;
     }
@@ -78,6 +84,50 @@ TEST(IlluminationCut, SampledVisibilityTracesFewerRaysForLittleMoreError) {
   EXPECT_LT(sampled.counters.rays, full.counters.rays * 2 / 3);
   EXPECT_LT(test::mean_relative_error(sampled.radiance, reference.radiance),
             test::mean_relative_error(full.radiance, reference.radiance) + 0.005);
+}
+
+TEST(IlluminationCut, RecursiveSamplingTracesFewestRays) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 2000);
+  const test::RenderOptions size{.width = 256, .height = 192};
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}, size),
+             all_or_few = test::render(*scene, kId, vpls, {{"visibility", "sampling"}}, size),
+             recursive = test::render(*scene, kId, vpls, {{"visibility", "recursive"}}, size);
+  EXPECT_LT(recursive.counters.rays, all_or_few.counters.rays);
+  EXPECT_LT(test::mean_relative_error(recursive.radiance, reference.radiance),
+            test::mean_relative_error(all_or_few.radiance, reference.radiance) + 0.01);
+}
+
+TEST(IlluminationCut, ARefinedCoarseImageSparesTheLargestErrors) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 10000);
+  const test::RenderOptions size{.width = 128, .height = 96};
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}, size);
+  const auto large_errors = [&](const char* rounds) {
+    const auto frame =
+        test::render(*scene, kId, vpls, {{"error", "0.05"}, {"visibility", "full"}, {"refine_coarse", rounds}}, size);
+    EXPECT_EQ(frame.counters.points, 128u * 96u) << rounds;
+    std::vector<double> errors;
+    for (size_t i = 0; i < reference.radiance.size(); ++i)
+      errors.push_back(std::abs(luminance(frame.radiance[i]) / luminance(reference.radiance[i]) - 1.0));
+    std::nth_element(errors.begin(), errors.begin() + 12165, errors.end());  // 99 %
+    return errors[12165];
+  };
+  EXPECT_LT(large_errors("1"), large_errors("0"));
+}
+
+TEST(IlluminationCut, OneShadowAPixelIsTheWholeTruthOfOneSampleAPixel) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 2000);
+  for (const char* visibility : {"full", "sampling", "recursive", "unbiased"}) {
+    const auto each = test::render(*scene, kId, vpls, {{"visibility", visibility}}),
+               shared = test::render(*scene, kId, vpls, {{"visibility", visibility}, {"shadow_a_pixel", "true"}});
+    EXPECT_EQ(std::memcmp(each.radiance.data(), shared.radiance.data(), each.radiance.size() * sizeof(Rgb)), 0);
+    const test::RenderOptions four{.samples = 4};
+    EXPECT_LT(
+        test::render(*scene, kId, vpls, {{"visibility", visibility}, {"shadow_a_pixel", "true"}}, four).counters.rays,
+        test::render(*scene, kId, vpls, {{"visibility", visibility}}, four).counters.rays);
+  }
 }
 
 TEST(IlluminationCut, UnbiasedModesAreRightOnAverage) {

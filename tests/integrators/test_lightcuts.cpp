@@ -54,6 +54,27 @@ TEST(Lightcuts, LargestCutIsKept) {
   for (float cut : frame.cut_size) EXPECT_LE(cut, 41.0f);
 }
 
+TEST(Lightcuts, ADarkFloorSparesClustersOfDarkPointsAlone) {
+  const auto scene = test::make_room();
+  const VplSet vpls = test::lights_of(*scene, 10000);
+  const auto reference = test::render(*scene, "exhaustive", vpls, {}),
+             plain = test::render(*scene, "lightcuts", vpls, {}),
+             floored = test::render(*scene, "lightcuts", vpls, {{"dark_floor", "0.5"}});
+  EXPECT_LT(floored.counters.clusters, plain.counters.clusters);
+  EXPECT_LT(test::rmse_over_mean(floored.radiance, reference.radiance), 0.02);
+  double mean = 0;
+  for (const Rgb& r : reference.radiance) mean += luminance(r) / static_cast<double>(reference.radiance.size());
+  size_t bright = 0;
+  double clusters = 0, as_many = 0;
+  for (size_t i = 0; i < reference.radiance.size(); ++i)
+    if (luminance(reference.radiance[i]) > 0.8 * mean)
+      ++bright, clusters += floored.cut_size[i], as_many += plain.cut_size[i];
+  ASSERT_GT(bright, 100u);
+  EXPECT_NEAR(clusters / as_many, 1.0, 0.01) << "bright points keep their cuts";
+  const auto four = test::render(*scene, "lightcuts", vpls, {{"dark_floor", "0.5"}}, {.threads = 4});
+  EXPECT_EQ(std::memcmp(floored.radiance.data(), four.radiance.data(), four.radiance.size() * sizeof(Rgb)), 0);
+}
+
 TEST(Lightcuts, SameImageOnOneAndFourThreads) {
   const auto scene = test::make_room();
   const VplSet vpls = test::lights_of(*scene, 3000);
