@@ -54,8 +54,9 @@ struct Workspace {
   float weight[kMaxLit];  // visibility of the lit points, or its estimate
   uint8_t known[kMaxLit];
   // Those of them whose shadows are asked for, and for each the one that stands for it.
-  uint32_t own[kMaxLit], stands[kMaxLit];
+  const uint32_t* own = nullptr;
   size_t own_count = 0;
+  uint32_t of_pixels[kMaxLit], stands[kMaxLit];
   // Points that are asked for at once.
   float x[kMaxLit + kLanes], y[kMaxLit + kLanes], z[kMaxLit + kLanes];
   uint32_t asked[kMaxLit];

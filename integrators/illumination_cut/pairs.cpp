@@ -193,13 +193,17 @@ void IlluminationCut::add_light(const PointTree& points, size_t region, size_t g
 }
 
 void IlluminationCut::choose_own(const PointTree& points, size_t first, Workspace& work) const {
+  static constexpr auto kAll = [] {
+    std::array<uint32_t, kMaxLit> all{};
+    for (uint32_t i = 0; i < kMaxLit; ++i) all[i] = i;
+    return all;
+  }();
   const auto n = static_cast<uint32_t>(work.lit.count);
-  work.own_count = 0;
   if (!shadow_a_pixel_) {
-    for (uint32_t i = 0; i < n; ++i) work.own[i] = i;
-    work.own_count = n;
+    work.own = kAll.data(), work.own_count = n;
     return;
   }
+  work.own = work.of_pixels, work.own_count = 0;
   constexpr uint32_t kSlots = 2 * kMaxLit;
   uint16_t slots[kSlots] = {};  // by pixel: one more than the lit point that stands for it
   for (uint32_t i = 0; i < n; ++i) {
@@ -207,7 +211,7 @@ void IlluminationCut::choose_own(const PointTree& points, size_t first, Workspac
     uint32_t slot = (pixel * 2654435761u) % kSlots;
     while (slots[slot] != 0 && points.points.pixel[first + work.lit.index[slots[slot] - 1u]] != pixel)
       slot = (slot + 1) % kSlots;
-    if (slots[slot] == 0) slots[slot] = static_cast<uint16_t>(i + 1), work.own[work.own_count++] = i;
+    if (slots[slot] == 0) slots[slot] = static_cast<uint16_t>(i + 1), work.of_pixels[work.own_count++] = i;
     work.stands[i] = slots[slot] - 1u;
   }
 }
