@@ -17,6 +17,10 @@ if "bpy" in locals():  # reloaded by the host: its parts, too, from the bottom u
                   engine, preferences, operators, panels, data_panels):  # noqa: F821
         importlib.reload(_part)
 else:
+    try:
+        import numpy  # noqa: F401
+    except ImportError:
+        raise ImportError("Lumicut needs NumPy in Blender's Python: Blender's own builds have it, beside Debian's install python3-numpy") from None
     from .lumicut import library  # noqa: F401
     from . import (cameras, collect, compat, data_panels, directions, engine, export, falloffs, hit_passes, ies, images, lamp_textures, lights, linking, mappings, materials,  # noqa: F401
                    mesh_attributes, migration, motion, nodes, operators, panels, passes, preferences, program_values, programs, properties, report,

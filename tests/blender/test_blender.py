@@ -140,6 +140,11 @@ class Farms(Blender):
         self.assertEqual(done.returncode, 1, done.stdout)
         self.assertIsNone(image)
 
+    def test_without_numpy_the_add_on_says_what_to_install(self):
+        # As beside Debian's Blender, which does not depend on it.
+        done = self.home.python("import sys; sys.modules['numpy'] = None\nimport addon_utils; addon_utils.enable('lumicut_blender')")
+        self.assertRegex(done.stdout, "ImportError: Lumicut needs NumPy .*python3-numpy")
+
     @unittest.skipIf(ZIP, "the zip's own library is there")
     def test_a_missing_library_ends_with_1_no_image_and_says_what_was_tried(self):
         blend = make_room(self.home)
