@@ -97,6 +97,24 @@ SceneExtent::SceneExtent(std::vector<Aabb> boxes) {
   for (size_t i = 0; i < parts_.size(); ++i)
     values[i] = {length(parts_[i].center - center_) + parts_[i].radius, parts_[i].share};
   radius_ = kTypicalScale * weighted_quantile(values, kTypicalQuantile);
+  add_surroundings();
+}
+
+// A ground of a few triangles that reaches far beyond all else has one part, whose lights lie so far apart that none lies
+// beside what stands on it, where its light comes from. Parts around the centre, each kGrowth times the one within, make
+// the lights' density fall like the squared distance.
+void SceneExtent::add_surroundings() {
+  constexpr float kGrowth = 3.0f, kShare = 1.0f / 3.0f;
+  float largest = 0.0f;
+  for (const Part& p : parts_)
+    if (length(p.center - center_) < p.radius) largest = std::max(largest, p.radius);
+  if (!(kGrowth * kGrowth * radius_ < largest)) return;
+  std::vector<Part> around;
+  for (float r = kGrowth * radius_; r < largest && around.size() < kMostParts; r *= kGrowth)
+    around.push_back({center_, r, 0.0f});
+  for (Part& p : parts_) p.share *= 1.0f - kShare;
+  for (Part& p : around) p.share = kShare / static_cast<float>(around.size());
+  parts_.insert(parts_.end(), around.begin(), around.end());
 }
 
 }  // namespace lumicut

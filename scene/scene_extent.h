@@ -21,7 +21,7 @@ class SceneExtent {
   // `boxes`: of the triangles, or of groups of them.
   explicit SceneExtent(std::vector<Aabb> boxes);
 
-  // At most about kMostParts, which together hold all geometry; shares add up to 1. Things of one size (within a factor of
+  // At most about twice kMostParts, which together hold all geometry; shares add up to 1. Things of one size (within a factor of
   // four) have as many parts as those of another, where there are so many: a distant ground of a few triangles or a dome
   // takes no more attention than a room.
   std::span<const Part> parts() const { return parts_; }
@@ -34,6 +34,7 @@ class SceneExtent {
 
  private:
   void add_parts(std::vector<Aabb> boxes, size_t most);
+  void add_surroundings();
   std::vector<Part> parts_;
   Vec3f center_{};
   float radius_ = 1.0f;

@@ -77,6 +77,30 @@ TEST(SceneExtent, HardlyFeelsADistantObjectAGroundOrADome) {
   }
 }
 
+// Share of light from above for each place of a ground that reaches far.
+TEST(SceneExtent, AGroundFarBeyondAllElseHasSurroundingsThatThinOut) {
+  std::vector<Aabb> boxes = room();
+  for (const float x : {-2500.0f, 2500.0f}) boxes.push_back(box_around({x, 0, 0}, {2500, 5000, 0}));
+  const SceneExtent extent(boxes);
+  ASSERT_LE(extent.parts().size(), 2 * SceneExtent::kMostParts);
+  const auto density = [&](float distance) {
+    const Vec3f at = extent.center() + Vec3f{distance, 0, 0};
+    double sum = 0.0;
+    for (const auto& p : extent.parts())
+      if (length(at - p.center) < p.radius)
+        sum += static_cast<double>(p.share) / (static_cast<double>(p.radius) * static_cast<double>(p.radius));
+    return sum;
+  };
+  // Ten times as far a hundred times as thin, and never much more at once.
+  double before = density(30.0f);
+  for (float distance = 60.0f; distance < 2000.0f; distance *= 2.0f) {
+    const double here = density(distance);
+    EXPECT_GT(here, 0.09 * before) << distance;
+    EXPECT_LT(here, 1.01 * before) << distance;
+    before = here;
+  }
+}
+
 TEST(SceneExtent, OfNothingAndOfOnePointAreSmallSpheres) {
   EXPECT_EQ(SceneExtent().radius(), 1.0f);
   EXPECT_TRUE(SceneExtent(std::vector<Aabb>(3)).parts().empty());
