@@ -5,10 +5,12 @@
     bench/progressive.py curve SCENE.json --folder out/cornell --size 96x72 --passes 1 4 16 64 256 1024 -- -p compensate=true --vpls 1000
     bench/progressive.py plot out/cornell out/kitchen --output curve.svg
     bench/progressive.py coverage SCENE.json --folder out/cornell --size 48x36 --passes 8 16 32 --seeds 6 -- -p compensate=true --vpls 300
+    bench/progressive.py coverage SCENE.json --folder out/cornell --denoised --passes 16 -- -p compensate=true --vpls 3000
 
 `truth` renders the path tracer in parts of their own seeds, and keeps what was rendered before: how the parts differ is the
 noise of their mean, which is taken off errors in quadrature. `curve` goes on from one number of passes to the next by its
-checkpoint. The truth that `coverage` compares with may be of so many times the size. What follows -- is given to `lumicut render`. Needs numpy and OpenImageIO's Python module (python3-openimageio).
+checkpoint. The truth that `coverage` compares with may be of so many times the size; `--denoised` looks at the filtered image and its
+interval. What follows -- is given to `lumicut render`, with `truth` in place of the path tracer's options. Needs numpy and OpenImageIO's Python module (python3-openimageio).
 """
 import argparse
 import json
@@ -39,7 +41,9 @@ def load(path, layer="radiance"):
     buffer = oiio.ImageBuf(str(path))
     names = list(buffer.spec().channelnames)
     pixels = buffer.get_pixels(oiio.FLOAT).astype(np.float64)
-    return pixels[..., [names.index(c) for c in "RGB"]] if layer == "radiance" else pixels[..., names.index(f"{layer}.V")]
+    if f"{layer}.V" in names:
+        return pixels[..., names.index(f"{layer}.V")]
+    return pixels[..., [names.index(c if layer == "radiance" else f"{layer}.{c}") for c in "RGB"]]
 
 
 def cells(image):
@@ -69,8 +73,8 @@ def truth(options):
     for part in range(options.parts):
         path = options.folder / f"truth.{part:02}.exr"
         if not path.exists():
-            render(options, path, "-i", "path_tracer", "-p", f"samples={options.paths}", "--spp", options.spp, "--seed", 1000 + part,
-                   "--layers", "radiance")
+            of = options.arguments or ["-i", "path_tracer", "-p", f"samples={options.paths}", "--spp", options.spp]
+            render(options, path, *of, "--seed", 1000 + part, "--layers", "radiance")
     t = Truth(options.folder)
     mean = t.image.mean()
     print(f"{len(t.parts)} parts; noise of the mean {100 * np.sqrt(t.noise2) / mean:.2f} % a pixel, "
@@ -102,18 +106,24 @@ def plot(options):
 
 
 def coverage(options):
-    luminance = Truth(options.folder).image @ [0.2126, 0.7152, 0.0722]
-    print("| passes | within their interval | least and largest of the seeds |\n|---|---|---|")
+    weights = [0.2126, 0.7152, 0.0722]
+    luminance = Truth(options.folder).image @ weights
+    layers = ("denoised", "denoised_error") if options.denoised else ("radiance", "error")
+    print("| passes | within their interval | least and largest of the seeds | RMSE / mean | mean |\n|---|---|---|---|---|")
     for passes in options.passes:
-        shares = []
+        shares, errors, means = [], [], []
         for seed in range(1, options.seeds + 1):
             path = options.folder / f"{options.name}.{passes}.seed{seed}.exr"
-            render(options, path, *options.arguments, "--passes", passes, "--seed", seed, "--layers", "radiance,error")
-            image = load(path) @ [0.2126, 0.7152, 0.0722]
+            render(options, path, *options.arguments, "--passes", passes, "--seed", seed, "--layers", ",".join(("radiance",) + layers),
+                   "--denoise" if options.denoised else "--no-denoise")
+            image = load(path, layers[0]) @ weights
             side = luminance.shape[0] // image.shape[0]  # of the truth's pixels in one of these
             off = np.abs(image - luminance.reshape(image.shape[0], side, image.shape[1], side).mean((1, 3)))
-            shares.append((off <= load(path, "error")).mean())
-        print(f"| {passes} | {100 * np.mean(shares):.1f} % | {100 * min(shares):.1f}-{100 * max(shares):.1f} % |", flush=True)
+            shares.append((off <= load(path, layers[1])).mean())
+            errors.append(np.sqrt((off ** 2).mean()) / luminance.mean())
+            means.append(image.mean() / luminance.mean() - 1)
+        print(f"| {passes} | {100 * np.mean(shares):.1f} % | {100 * min(shares):.1f}-{100 * max(shares):.1f} % | "
+              f"{100 * np.mean(errors):.1f} % | {100 * np.mean(means):+.2f} % |", flush=True)
 
 
 def main():
@@ -137,6 +147,7 @@ def main():
             mode.add_argument("--name", default="lightcuts", help="of the files, and of the curve")
         if name == "coverage":
             mode.add_argument("--seeds", type=int, default=6)
+            mode.add_argument("--denoised", action="store_true", help="of the filtered image")
     mode = modes.add_parser("plot")
     mode.set_defaults(run=plot)
     mode.add_argument("folders", type=pathlib.Path, nargs="+")
