@@ -108,7 +108,7 @@ void SceneExtent::add_surroundings() {
   float largest = 0.0f;
   for (const Part& p : parts_)
     if (length(p.center - center_) < p.radius) largest = std::max(largest, p.radius);
-  if (!(kGrowth * kGrowth * radius_ < largest)) return;
+  if (!(radius_ > 0.0f && kGrowth * kGrowth * radius_ < largest)) return;
   std::vector<Part> around;
   for (float r = kGrowth * radius_; r < largest && around.size() < kMostParts; r *= kGrowth)
     around.push_back({center_, r, 0.0f});
