@@ -212,6 +212,11 @@ class Examiner {
     return c;
   }
 
+  // Nothing is known of what a program gives.
+  bool programmed(int32_t texture) const {
+    return texture > 0 && scene_.textures[static_cast<size_t>(texture) - 1].program.has_value();
+  }
+
   void measure() {
     for (const auto& mesh : scene_.meshes)
       for (size_t i = 0; i < instance_count(mesh); ++i) {
@@ -405,6 +410,8 @@ class Examiner {
     double reflected = 0, total = 0;
     for (size_t m = 0; m < area.size(); ++m) {
       const auto& v = scene_.materials[m].values;
+      if (programmed(v.diffuse_texture) || programmed(v.specular_texture) || programmed(v.translucency_texture))
+        continue;
       Point albedo = textured(v.diffuse, v.diffuse_texture) + textured(v.translucency, v.translucency_texture);
       // With Fresnel's curve it is a factor of what a coat reflects, which leaves the rest to what is beneath.
       const bool coated = (v.flags & LUMICUT_GGX) != 0 && (v.flags & LUMICUT_NO_FRESNEL) == 0;

@@ -132,6 +132,13 @@ class Check(Base):
             or s["meshes"][2].update(material="mix"), "mix", "1.4")
         self.assert_suspects("albedo_near_one", lambda s: s["materials"][0].update(diffuse=[0.99, 0.99, 0.99]), "99.0 %")
 
+    def test_surfaces_of_programs_are_not_counted_as_white(self):
+        def change(scene):
+            scene["programs"] = [{"name": "dots", "steps": [{"op": "position"}]}]
+            scene["materials"][0].update(diffuse=[1, 1, 1], diffuse_texture={"program": "dots"})
+
+        self.assertEqual(self.kinds(change), set())
+
     def test_scenes_far_from_the_origin_are_named(self):
         def far(s):
             for mesh in s["meshes"]:
