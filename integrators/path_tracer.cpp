@@ -29,7 +29,7 @@ class PathTracer final : public Integrator {
   void prepare(const Scene& scene, const VplSet&, const Params& params, ShadeContext context) override {
     scene_ = &scene;
     sampler_ = std::make_unique<LightSampler>(scene, &context.progress);
-    light_surfaces_ = std::make_unique<LightSurfaces>(scene);
+    light_surfaces_ = std::make_unique<LightSurfaces>(scene, LightSurfaces::RaysOf::paths);
     samples_ = params.own<PathTracerParams>().samples;
     max_depth_ = params.common().max_depth;
     seed_ = params.common().seed;

@@ -1,5 +1,6 @@
 #include "lights/light_surfaces.h"
 
+#include <cmath>
 #include <numbers>
 
 #include "lights/light_sampler.h"
@@ -7,15 +8,18 @@
 
 namespace lumicut {
 
-LightSurfaces::LightSurfaces(const Scene& scene, bool of_camera) : scene_(scene) {
+LightSurfaces::LightSurfaces(const Scene& scene, RaysOf rays) : scene_(scene) {
   bool disks = false;
   for (uint32_t i = 0; i < scene.lights().size(); ++i) {
     const Light& l = scene.lights()[i];
     const bool seen = l.reach.lights(kCameraRay);
-    if (of_camera && !seen) continue;
-    if (seen && (l.type == LightType::point || l.type == LightType::spot) && l.radius > 0.0f && l.profile == 0 &&
-        max_component(l.value) > 0.0f)
-      lamps_.push_back(i);
+    if (rays == RaysOf::camera && !seen) continue;
+    if (l.radius > 0.0f && max_component(l.value) > 0.0f) {
+      const bool shown = rays == RaysOf::mirrors && l.reach.lights(kGlossyRay | kTransmissionRay);
+      if ((seen || shown) && (l.type == LightType::point || l.type == LightType::spot) && l.profile == 0)
+        lamps_.push_back(i);
+      if (shown && l.type == LightType::sun) suns_.push_back(i);
+    }
     if (!has(l) || !(max_component(l.value) > 0.0f) || !(area(l) > 0.0f)) continue;
     const auto base = static_cast<uint32_t>(positions_.size());
     lights_.push_back(i);
@@ -80,6 +84,16 @@ bool LightSurfaces::meet_lamp(uint32_t lamp, const Vec3f& origin, const Vec3f& d
   const float falloff = l.type == LightType::spot ? spot_falloff(emits, -dot(l.direction, direction)) : 1.0f;
   hit.light = lamp, hit.cosine = 1.0f, hit.by_rays = false;
   hit.radiance = l.value * (falloff * std::numbers::inv_pi_v<float> / r2);
+  return true;
+}
+
+// Even over the cone that it is sampled in.
+bool LightSurfaces::meet_sun(uint32_t sun, const Vec3f& direction, Hit& hit) const {
+  const Light& l = scene_.lights()[sun];
+  if (!(dot(direction, -l.direction) > std::cos(l.radius))) return false;
+  const float half = std::sin(0.5f * l.radius);
+  hit.light = sun, hit.t = std::numeric_limits<float>::infinity(), hit.cosine = 1.0f, hit.by_rays = false;
+  hit.radiance = l.value / (4.0f * std::numbers::pi_v<float> * half * half);
   return true;
 }
 

@@ -3,6 +3,7 @@
 // camera sees.
 #pragma once
 
+#include <limits>
 #include <memory>
 
 #include "scene/scene.h"
@@ -11,9 +12,11 @@ namespace lumicut {
 
 class LightSurfaces final : private HitFilter {
  public:
-  // `of_camera`: those alone that it sees.
-  explicit LightSurfaces(const Scene& scene, bool of_camera = false);
-  bool empty() const { return lights_.empty() && lamps_.empty(); }
+  // Whose rays meet them. Of the camera: what it sees alone. By way of mirrors and glass from the camera: lamps and suns
+  // with a radius too, which nothing else would show there. Paths: lights that samples cannot stand for alone.
+  enum class RaysOf { camera, mirrors, paths };
+  LightSurfaces(const Scene& scene, RaysOf rays);
+  bool empty() const { return lights_.empty() && lamps_.empty() && suns_.empty(); }
 
   struct Hit {
     uint32_t light;  // of the scene
@@ -30,6 +33,8 @@ class LightSurfaces final : private HitFilter {
       if (max_component(hit.radiance) > 0.0f) fn(hit);
     for (const uint32_t lamp : lamps_)
       if (meet_lamp(lamp, origin, direction, far, hit) && max_component(hit.radiance) > 0.0f) fn(hit);
+    for (const uint32_t sun : suns_)
+      if (far == std::numeric_limits<float>::infinity() && meet_sun(sun, direction, hit)) fn(hit);
   }
 
  private:
@@ -38,11 +43,12 @@ class LightSurfaces final : private HitFilter {
   static constexpr int kMostLights = 64;  // along one ray
   bool next(const Vec3f& origin, const Vec3f& direction, float& near, float far, Hit& hit) const;
   bool meet_lamp(uint32_t lamp, const Vec3f& origin, const Vec3f& direction, float far, Hit& hit) const;
+  bool meet_sun(uint32_t sun, const Vec3f& direction, Hit& hit) const;
   bool passes(uint32_t mesh, uint32_t prim, float u, float v) const override;
 
   const Scene& scene_;
   std::vector<uint32_t> lights_;
-  std::vector<uint32_t> lamps_;  // with a radius
+  std::vector<uint32_t> lamps_, suns_;  // with a radius
   std::vector<Vec3f> positions_;
   std::vector<uint32_t> indices_;
   std::unique_ptr<Accel> accel_;

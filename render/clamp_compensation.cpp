@@ -41,7 +41,7 @@ ClampCompensation::ClampCompensation(const Scene& scene, const Clamp& clamp, con
       trace_gloss_(trace_gloss),
       direct_(direct),
       seed_(seed),
-      light_surfaces_(scene) {}
+      light_surfaces_(scene, LightSurfaces::RaysOf::paths) {}
 
 float ClampCompensation::lost_at(const Search& search, const Vec3f& position, float distance) const {
   const float clamp2 = clamp_.at2(position, search.scratch);

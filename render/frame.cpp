@@ -438,11 +438,11 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
   }
   const CameraRays camera(scene.camera(), options);
   std::optional<LightSurfaces> light_surfaces;
-  if (scene.may_be_specular()) light_surfaces.emplace(scene);
+  if (scene.may_be_specular()) light_surfaces.emplace(scene, LightSurfaces::RaysOf::mirrors);
   std::optional<LightSurfaces> seen_lamps;
   if (std::any_of(scene.lights().begin(), scene.lights().end(),
                   [](const Light& l) { return l.reach.lights(kCameraRay); }))
-    seen_lamps.emplace(scene, true);
+    seen_lamps.emplace(scene, LightSurfaces::RaysOf::camera);
   std::optional<ClampCompensation> compensation;
   if (light.compensated != nullptr)
     compensation.emplace(scene, *light.compensated, light.nearby, light.spheres, light.trace_gloss, options.direct,

@@ -184,6 +184,28 @@ TEST(LightReach, TheCameraSeesLampsThatItShall) {
   }
 }
 
+// As the camera itself sees none of them, and samples of lights mean nothing to a mirror, nothing else would show them.
+TEST(LightReach, MirrorsShowLampsAndSunsWithARadius) {
+  Material mirror = test::diffuse(1, 1, 1);  // the colour of a metal
+  mirror.lobe = LobeModel::ggx, mirror.specular = {1, 1, 1}, mirror.metallic = 1, mirror.roughness = 0;
+  const Vec3f up = normalize(Vec3f{0.2f, 1.9f, 1});  // where the camera's rays go that meet the right half's front
+  Light ball;
+  ball.value = {2, 2, 2}, ball.position = Vec3f{0.2f, -0.3f, -1} + up * 3.0f, ball.radius = 0.4f;
+  Light sun;
+  sun.type = LightType::sun, sun.value = {1, 1, 1}, sun.direction = -up, sun.radius = 0.15f;
+  const double of_ball = 2 / (M_PI * 0.16), of_sun = 1 / (2 * M_PI * (1 - std::cos(0.15)));
+  for (auto [lamp, radiance] : {std::pair{ball, of_ball}, {sun, of_sun}})
+    for (const char* id : {"exhaustive", "path_tracer"}) {
+      const auto most = [&](uint32_t seen_by) {
+        lamp.reach.seen_by = seen_by;
+        const auto image = render(*floor(lamp, mirror), id);
+        return double{std::max_element(image.begin(), image.end(), [](Rgb a, Rgb b) { return a.x < b.x; })->x};
+      };
+      EXPECT_NEAR(most(kLit), radiance, 1e-3 * radiance) << id;
+      EXPECT_LT(most(kDiffuseRay), 0.5 * radiance) << id;
+    }
+}
+
 TEST(LightReach, WorldsAreSeenByKindsOfRays) {
   const auto lit = [](uint32_t seen_by, const Material& right, const char* id) {
     return render(*floor(bulb(0), right,
