@@ -930,6 +930,8 @@ class Reader {
     const std::string basis = p.word("basis", "bezier"), type = p.word("type", "flat");
     if (given != 2 && given != 3) tokens_.fail(fmt::format("{} has the degree {}", name, given));
     if (basis != "bezier" && basis != "bspline") tokens_.fail(fmt::format("{} has the basis {}", name, shown(basis)));
+    if (type != "flat" && type != "cylinder" && type != "ribbon")
+      tokens_.fail(fmt::format("{} has the type {}", name, shown(type)));
     const auto degree = static_cast<size_t>(given);
     const PbrtParameter *places = p.find("P"), *normals = p.find("N");
     const size_t count = places == nullptr ? 0 : places->numbers.size() / 3;
@@ -940,10 +942,18 @@ class Reader {
     if (basis == "bspline") points = bezier_of_bspline(points, degree);
     const size_t segments = (points.size() - 1) / degree;
     if (type == "ribbon" && (normals == nullptr || normals->numbers.size() != 3 * (segments + 1)))
-      tokens_.fail(fmt::format("{}, a ribbon of {} segments, has other numbers of N", name, segments));
+      tokens_.fail(fmt::format("{}, a ribbon of {} segments, has {} numbers in N, not {}", name, segments,
+                               normals == nullptr ? 0 : normals->numbers.size(), 3 * (segments + 1)));
     if (type == "flat") build_.approximate("flat curves, which turn to whoever sees them, are tubes");
     const double w0 = p.number("width0", width), w1 = p.number("width1", width);
-    if (!(w0 >= 0 && w1 >= 0)) tokens_.fail(fmt::format("{} has the widths {} and {}", name, w0, w1));
+    constexpr double kWidest = 1e18;  // as far as anything may reach
+    if (!(w0 >= 0 && w1 >= 0 && w0 <= kWidest && w1 <= kWidest))
+      tokens_.fail(fmt::format("{} has the widths {} and {}", name, w0, w1));
+    if (std::all_of(points.begin(), points.end(), [&](const CurvePoint& c) { return c.place == points[0].place; }) ||
+        (w0 == 0 && w1 == 0)) {
+      for (const char* unused : {"splitdepth", "alpha"}) p.ignore(unused);
+      return build_.leave_out("curves without length or width");
+    }
     // Widths and normals are linear between the ends of the curve and of its segments.
     for (size_t i = 0; i < points.size(); ++i) {
       points[i].radius = 0.5 * (w0 + (w1 - w0) * double(i) / double(points.size() - 1));

@@ -105,10 +105,12 @@ class RenderCommand {
     check_outputs();
     // One image, of lights that are kept or known.
     apply_preset(api(), o_, o_.squares > 0 || !o_.vpl_in.empty() || !o_.vpl_out.empty());
-    const auto channels = choose_channels(api(), o_.layers, denoised());
+    auto channels = choose_channels(api(), o_.layers, denoised());
     create_device();
     create_integrator();  // a wrong parameter shall not wait for big files
     read_scene();
+    if (!beside_.empty() && o_.layers.empty())
+      channels.push_back({"alpha", 1});  // shadows on clear ground are there alone
     commit();
     tell();
     check_memory(channels);
@@ -231,6 +233,7 @@ class RenderCommand {
         throw UsageError(fmt::format("{}: not with shadow catchers, which take several scenes: {}", option, o_.scene));
     };
     refuse(o_.squares > 0, "--squares"), refuse(!o_.vpl_in.empty(), "--vpl-in");
+    refuse(o_.groups, "--groups");
     io::SceneData of_beside = o_.verbosity >= 2 ? data : std::move(data);
     const auto add = [&] {
       beside_.emplace_back(api());
@@ -238,6 +241,7 @@ class RenderCommand {
       io::upload_scene(api(), beside_.back().get(), of_beside);
     };
     const bool shows_world = of_beside.environment && (of_beside.environment->flags & LUMICUT_HIDDEN) == 0;
+    clear_behind_ = !shows_world;
     const auto environment = of_beside.environment;
     leave_objects(of_beside), add();
     of_beside.environment = environment;
@@ -521,7 +525,8 @@ class RenderCommand {
     if (!o_.output.empty()) io::write_exr(o_.output, image, o_.half);
     if (!o_.png.empty()) {
       const auto radiance = read({denoised() ? "denoised" : "radiance", 3});
-      write_exposed_png(o_.png, {radiance.pixels, width, height}, o_.exposure);
+      write_exposed_png(o_.png, {radiance.pixels, width, height}, o_.exposure,
+                        clear_behind_ ? caught_->alpha : std::vector<float>{});
     }
     if (!o_.heat_maps.empty())
       for (const CountLayer& counts : kCountLayers) {
@@ -569,6 +574,7 @@ class RenderCommand {
   io::Handle<lumicut_integrator> integrator_{library_.api()};
   std::vector<std::pair<lumicut_tile, io::Handle<lumicut_render>>> parts_;
   std::vector<io::Handle<lumicut_scene>> beside_;  // that shadow catchers need
+  bool clear_behind_ = false;                      // with them, and no world that the camera sees
   std::optional<Caught> caught_;
   InterruptWatcher watcher_;             // ends before the handles that it may cancel
   api::VplSet lights_;                   // of --vpl-in
@@ -594,8 +600,8 @@ void add_render(CLI::App& app) {
   add_png_options(*command, o->png, o->exposure);
   command->add_option(
       "--layers", o->layers,
-      "Layers of the EXR, with commas, or `all` (default: radiance,depth,normal,albedo,cut_size,rays,bounds, and what "
-      "--denoise gives)");
+      "Layers of the EXR, with commas, or `all` (default: radiance,depth,normal,albedo,cut_size,rays,bounds, what "
+      "--denoise gives, and alpha where there are shadow catchers)");
   command->add_flag("--half", o->half, "16 bits a number in the EXR instead of 32");
   command->add_option("--size", o->size, "WIDTHxHEIGHT in pixels (default: the scene's)");
   command->add_option("--crop", o->crop, "x0,y0,x1,y1: the part of the image to render, row 0 on top");
@@ -646,7 +652,14 @@ void add_render(CLI::App& app) {
         (o->passes.value_or(1) > 1 || o->seconds > 0 || o->target_error > 0 || !o->checkpoint.empty()))
       throw UsageError("render: --squares renders one pass");
     catch_interrupts();
-    RenderCommand(*o).run();
+    try {
+      RenderCommand(*o).run();
+    } catch (const Interrupted&) {
+      std::error_code code;
+      if (o->checkpoint.empty() || !std::filesystem::is_regular_file(o->checkpoint, code)) throw;
+      throw Interrupted(
+          fmt::format("interrupted; {} holds the passes that were done, and --resume goes on", o->checkpoint));
+    }
   });
 }
 

@@ -59,6 +59,19 @@ class Catchers(cli.Cli):
         self.assertLess(left, 1 - 2 / (2 + 3.1416))
         self.assertLess(abs(pixels[8, 8, 3] - (1 - left)), 1e-4)
 
+    def test_shadows_are_in_the_usual_layers_and_the_picture(self):
+        self.render(lit=0)
+        exr, png = self.folder / "usual.exr", self.folder / "usual.png"
+        self.assert_ends(lumicut("render", self.folder / "scene.json", "-i", "exhaustive", "-p", "max_depth=0", "-o", exr, "--png", png), OK)
+        self.assertIn("A", oiio.ImageInput.open(str(exr)).spec().channelnames)
+        picture = oiio.ImageInput.open(str(png)).read_image("uint8")
+        self.assertEqual(picture.shape[2], 4)
+        self.assertEqual(picture[8, 8].tolist(), [0, 0, 0, 255])
+        self.assertEqual(picture[8, 1, 3], 0)
+        # Where a world is seen, the picture is of it, darkened.
+        self.render("--png", png, lit=0, color=[1, 1, 1])
+        self.assertEqual(oiio.ImageInput.open(str(png)).spec().nchannels, 3)
+
     def test_passes_and_crops_are_of_them_too(self):
         whole = self.render("--passes", "3", lit=0)
         part = self.render("--passes", "3", "--crop", "4,5,12,9", lit=0)
@@ -66,6 +79,7 @@ class Catchers(cli.Cli):
         self.assertEqual(abs(part - whole[5:9, 4:12]).max(), 0)
 
     def test_what_cannot_be_is_said(self):
+        self.assertIn("--groups: not with shadow catchers", self.render("--groups", code=USAGE))
         self.assertIn("--squares: not with shadow catchers", self.render("--squares", "1", code=USAGE))
         self.render("--vpl-out", self.folder / "a.vpl", lit=0)
         self.assertIn("--vpl-in: not with shadow catchers", self.render("--vpl-in", self.folder / "a.vpl", code=USAGE))

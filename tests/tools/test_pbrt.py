@@ -470,6 +470,15 @@ class Pbrt(SceneFiles):
             found = self.render(self.write("ribbon.pbrt", film + ribbon(normal)), "--vpls", 10, "--spp", 16)[0].mean()
             self.assertAlmostEqual(1 - found, share, delta=2e-3)
 
+    def test_curves_that_cannot_be_are_named(self):
+        curve = 'Shape "curve" {} "point3 P" [ 0 0 0 0 1 0 0 2 0 0 3 0 ]'.format
+        for words, text in (('"string type" "tube"', "the type tube"), ('"float width" 1e39', "the widths 1e+39"), ('"float width" -1', "the widths -1"),
+                            ('"string type" "ribbon"', "has 0 numbers in N, not 6"), ('"string basis" "hermite"', "the basis")):
+            self.assert_ends(lumicut("render", self.write("bad.pbrt", 'Film "rgb"\nWorldBegin\n' + curve(words)), "-o", self.folder / "x.exr"), BAD_FILE, text)
+        for nothing in (curve('"float width" 0'), 'Shape "curve" "point3 P" [ 1 1 1 1 1 1 1 1 1 1 1 1 ]'):
+            _, said = self.render(self.floor(nothing), "--vpls", 10)
+            self.assertIn("curves without length or width: left out", said)
+
     def test_much_hair_is_one_mesh(self):
         strand = 'Shape "curve" "float width" .01 "point3 P" [ {0} 0 0  {0} 1 0  {0} 2 0  {0} 3 0 ]\n'.format
         head = 'Film "rgb"\nWorldBegin\nMaterial "hair" "float eumelanin" {}\n'.format
@@ -517,7 +526,7 @@ class Pbrt(SceneFiles):
                               (("WorldBegin", 'WorldBegin Shape "plymesh" "string filename" "no.ply"'), ("no.ply",)),
                               (("WorldBegin", 'WorldBegin Shape "curve" "point3 P" [ 0 0 0 1 1 1 ]'), ("line 4", "6 numbers in P")),
                               (("WorldBegin", 'WorldBegin Shape "curve" "integer degree" 7 "point3 P" [ 0 0 0 1 1 1 ]'), ("line 4", "degree 7")),
-                              (("WorldBegin", 'WorldBegin Shape "curve" "string type" "ribbon" "point3 P" [ 0 0 0 1 1 1 2 2 2 3 3 3 ]'), ("1 segments", "of N"))):
+                              (("WorldBegin", 'WorldBegin Shape "curve" "string type" "ribbon" "point3 P" [ 0 0 0 1 1 1 2 2 2 3 3 3 ]'), ("1 segments", "in N"))):
             with self.subTest(change):
                 self.assertIn(change[0], good)
                 self.assert_ends(lumicut("render", self.write("bad.pbrt", good.replace(*change)), "-o", self.folder / "x.exr"), BAD_FILE, *texts)

@@ -51,12 +51,14 @@ class Progressive(Compared):
     def test_a_stopped_render_keeps_its_passes(self):
         kept = self.folder / "render.checkpoint"
         process = subprocess.Popen([COMMAND, "render", SCENE, "--passes", "100000", *SMALL, "--checkpoint", kept, "-o",
-                                    self.folder / "a.exr"], stderr=subprocess.DEVNULL)
+                                    self.folder / "a.exr"], stderr=subprocess.PIPE, text=True)
         limit = time.monotonic() + 60
         while not kept.exists() and process.poll() is None and time.monotonic() < limit:
             time.sleep(0.005)
         process.send_signal(signal.SIGINT)
-        self.assertEqual(process.wait(60), INTERRUPTED)
+        said = process.communicate(timeout=60)[1]
+        self.assertEqual(process.returncode, INTERRUPTED)
+        self.assertIn("render.checkpoint holds the passes that were done", said)
         self.assertEqual(self.files(), ["render.checkpoint"])
 
     def test_checkpoints_of_anything_else_are_refused(self):
