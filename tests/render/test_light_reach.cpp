@@ -194,11 +194,12 @@ TEST(LightReach, MirrorsShowLampsAndSunsWithARadius) {
   Light sun;
   sun.type = LightType::sun, sun.value = {1, 1, 1}, sun.direction = -up, sun.radius = 0.15f;
   const double of_ball = 2 / (M_PI * 0.16), of_sun = 1 / (2 * M_PI * (1 - std::cos(0.15)));
-  for (auto [lamp, radiance] : {std::pair{ball, of_ball}, {sun, of_sun}})
+  for (const auto& [lamp, radiance] : {std::pair{ball, of_ball}, {sun, of_sun}})
     for (const char* id : {"exhaustive", "path_tracer"}) {
-      const auto most = [&](uint32_t seen_by) {
-        lamp.reach.seen_by = seen_by;
-        const auto image = render(*floor(lamp, mirror), id);
+      const auto most = [&, lit = lamp](uint32_t seen_by) {
+        Light shown = lit;
+        shown.reach.seen_by = seen_by;
+        const auto image = render(*floor(shown, mirror), id);
         return double{std::max_element(image.begin(), image.end(), [](Rgb a, Rgb b) { return a.x < b.x; })->x};
       };
       EXPECT_NEAR(most(kLit), radiance, 1e-3 * radiance) << id;
