@@ -172,14 +172,14 @@ TEST(SceneJson, ShadowCatchersAndTheLightsThatAreOfThem) {
     return json{{"type", "point"}, {"position", {0, 1, 0}}, {"value", 1}, {"shadow_catcher", catcher}};
   };
   const SceneData data = changed([&](json& s) {
-    s["lights"] = {point(false), point(true)};
+    s["lights"] = json::array({point(false), point(true)});
     s["meshes"][0]["shadow_catcher"] = true;
   });
   EXPECT_TRUE(data.meshes[0].shadow_catcher);
   EXPECT_EQ(data.lights_of_catchers, std::set<size_t>{1});
   EXPECT_TRUE(data.warnings.empty());
   const SceneData alone = changed([&](json& s) {
-    s["lights"] = {point(false)};
+    s["lights"] = json::array({point(false)});
     s["meshes"][0]["shadow_catcher"] = true;
   });
   ASSERT_EQ(alone.warnings.lines().size(), 1u);
