@@ -9,6 +9,7 @@
 #include "io/file_error.h"
 #include "io/image_module.h"
 #include "io/image_size.h"
+#include "io/srgb.h"
 #include "io/text_lines.h"
 
 namespace lumicut::io::oiio {
@@ -44,8 +45,6 @@ Place place_of(const std::string& channel) {
   return {layer == "N" ? "normal" : layer, std::max(component, 0)};
 }
 
-float from_srgb(float v) { return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f); }
-
 // The layers of the part that is current.
 void add_layers(const std::string& path, OIIO::ImageInput& in, int part, Image& image) {
   const OIIO::ImageSpec spec = in.spec();
@@ -77,7 +76,7 @@ void add_layers(const std::string& path, OIIO::ImageInput& in, int part, Image& 
           for (size_t p = 0; p < pixels; ++p) layer.pixels[p * components + c] = data[p * channels + channel];
     }
     if (coded && components == 3)
-      std::transform(layer.pixels.begin(), layer.pixels.end(), layer.pixels.begin(), from_srgb);
+      std::transform(layer.pixels.begin(), layer.pixels.end(), layer.pixels.begin(), linear_of_srgb<float>);
     image.layers.push_back(std::move(layer));
   }
 }

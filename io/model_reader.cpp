@@ -16,6 +16,7 @@
 
 #include "io/affine.h"
 #include "io/model.h"
+#include "io/srgb.h"
 #include "io/text_lines.h"
 #include "io/vertex_colours.h"
 
@@ -26,8 +27,6 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr int kDeepest = 256;
 constexpr size_t kMostNodes = 1 << 22;
-
-double linear_of_srgb(double c) { return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4); }
 
 Affine affine(const aiMatrix4x4& m) {
   Affine out;

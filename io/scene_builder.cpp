@@ -9,6 +9,7 @@
 #include "io/file_error.h"
 #include "io/scene_defaults.h"
 #include "io/scene_model.h"
+#include "io/srgb.h"
 #include "io/vertex_colours.h"
 
 namespace lumicut::io {
@@ -242,8 +243,7 @@ Vec mean_of_texels(const Texture& t) {
   if (texels == 0) return {0.5, 0.5, 0.5};
   for (size_t i = 0; i < texels * n; ++i) {
     double x = t.bytes.empty() ? double{t.floats[i]} : t.bytes[i] / 255.0;
-    if (!t.bytes.empty() && (t.flags & LUMICUT_SRGB) != 0)
-      x = x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4);
+    if (!t.bytes.empty() && (t.flags & LUMICUT_SRGB) != 0) x = linear_of_srgb(x);
     if (n == 1)
       sum = sum + Vec{x, x, x};
     else if (i % n < 3)

@@ -20,6 +20,7 @@
 #include "io/scene_builder.h"
 #include "io/scene_defaults.h"
 #include "io/serialized_mesh.h"
+#include "io/srgb.h"
 #include "io/text_lines.h"
 
 namespace lumicut::io {
@@ -279,7 +280,6 @@ class Reader {
 
   // ---- Colours
 
-  static double linear(double c) { return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4); }
   static Vec in_rgb(const Spectrum& spectrum, bool light) {
     return light ? rgb_of_spectrum(spectrum) : rgb_of_reflectance(spectrum);
   }
@@ -322,7 +322,7 @@ class Reader {
         int byte = 0;
         const auto [end, error] = std::from_chars(&value[1 + 2 * k], &value[3 + 2 * k], byte, 16);
         if (error != std::errc() || end != &value[3 + 2 * k]) fail(node, "is no colour of six digits");
-        out[k] = linear(byte / 255.0);
+        out[k] = linear_of_srgb(byte / 255.0);
       }
       return out;
     }
@@ -351,7 +351,7 @@ class Reader {
     }
     if (kind == "srgb") {
       Vec out = vector_of(node, {0, 0, 0});
-      for (double& c : out) c = linear(c);
+      for (double& c : out) c = linear_of_srgb(c);
       return out;
     }
     const auto list = numbers(node, value);

@@ -946,8 +946,7 @@ class Reader {
                                normals == nullptr ? 0 : normals->numbers.size(), 3 * (segments + 1)));
     if (type == "flat") build_.approximate("flat curves, which turn to whoever sees them, are tubes");
     const double w0 = p.number("width0", width), w1 = p.number("width1", width);
-    constexpr double kWidest = 1e18;  // as far as anything may reach
-    if (!(w0 >= 0 && w1 >= 0 && w0 <= kWidest && w1 <= kWidest))
+    if (!(w0 >= 0 && w1 >= 0 && w0 <= kLargestCoordinate && w1 <= kLargestCoordinate))
       tokens_.fail(fmt::format("{} has the widths {} and {}", name, w0, w1));
     if (std::all_of(points.begin(), points.end(), [&](const CurvePoint& c) { return c.place == points[0].place; }) ||
         (w0 == 0 && w1 == 0)) {

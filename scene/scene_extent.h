@@ -21,9 +21,9 @@ class SceneExtent {
   // `boxes`: of the triangles, or of groups of them.
   explicit SceneExtent(std::vector<Aabb> boxes);
 
-  // At most about twice kMostParts, which together hold all geometry; shares add up to 1. Things of one size (within a factor of
-  // four) have as many parts as those of another, where there are so many: a distant ground of a few triangles or a dome
-  // takes no more attention than a room.
+  // At most about twice kMostParts, which together hold all geometry; shares add up to 1. Things of one size (within a
+  // factor of four) have as many parts as those of another, where there are so many: a distant ground of a few triangles
+  // or a dome takes no more attention than a room.
   std::span<const Part> parts() const { return parts_; }
   // Where most of the parts lie, weighted by their shares: a distant object does not move it.
   const Vec3f& center() const { return center_; }

@@ -267,16 +267,10 @@ class RenderCommand {
       create_integrator(integrator);
       io::Handle<lumicut_render> render(api());
       io::check(api(), api().render_start(integrator.get(), scene.get(), &desc, render.out()), "render of shadows");
-      watcher_.watch(render.get());
-      lumicut_result result;
-      do {
-        status.struct_size = sizeof(status);
-        result = api().render_wait(render.get(), 100, &status);
-        if (result == LUMICUT_OK)
+      const lumicut_result result = finish(render.get(), status, [&](bool known) {
+        if (known)
           bar_.show(fmt::format("shadows {}/{}", frames.size() + 1, beside_.size()), status.fraction, status.seconds);
-      } while (result == LUMICUT_OK && (status.state == LUMICUT_RUNNING || status.state == LUMICUT_IDLE));
-      watcher_.watch(nullptr);
-      stop_if_interrupted();
+      });
       io::check(api(), result, "render of shadows");
       frames.push_back(read_caught(render.get()));
     }
@@ -390,23 +384,32 @@ class RenderCommand {
     throw io::FileError(o_.checkpoint, api().last_error());
   }
 
-  void wait_for(size_t index, size_t count) {
-    const lumicut_render render = parts_[index].second.get();
+  // Waits for the end of a render, which Ctrl-C may hasten. `tell(whether the status is known)` ten times a second.
+  template <typename Fn>
+  lumicut_result finish(lumicut_render render, lumicut_status& status, const Fn& tell) {
     watcher_.watch(render);
-    lumicut_status status{};
     lumicut_result result;
     do {
       status.struct_size = sizeof(status);
       result = api().render_wait(render, 100, &status);
+      tell(result == LUMICUT_OK);
+    } while (result == LUMICUT_OK && (status.state == LUMICUT_RUNNING || status.state == LUMICUT_IDLE));
+    watcher_.watch(nullptr);
+    stop_if_interrupted();
+    return result;
+  }
+
+  void wait_for(size_t index, size_t count) {
+    const lumicut_render render = parts_[index].second.get();
+    lumicut_status status{};
+    const lumicut_result result = finish(render, status, [&](bool known) {
       keep_checkpoint(render, status);
-      if (result == LUMICUT_OK)
+      if (known)
         bar_.show(
             phase_text(status),
             count == 1 ? status.fraction : (static_cast<double>(index) + status.fraction) / static_cast<double>(count),
             status.seconds);
-    } while (result == LUMICUT_OK && (status.state == LUMICUT_RUNNING || status.state == LUMICUT_IDLE));
-    watcher_.watch(nullptr);
-    stop_if_interrupted();
+    });
     check_render(result);
     if (desc_.checkpoint == nullptr || o_.seconds > 0 || o_.target_error > 0 ||
         status.passes_done <= std::max(1u, desc_.passes))

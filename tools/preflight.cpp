@@ -11,6 +11,7 @@
 #include <numbers>
 #include <tuple>
 
+#include "io/srgb.h"
 #include "tools/mesh_shells.h"
 
 namespace lumicut::tools {
@@ -31,14 +32,12 @@ double largest(const Point& c) { return std::max({c[0], c[1], c[2]}); }
 Point vec(const float (&v)[3]) { return {v[0], v[1], v[2]}; }
 std::string shown(const Point& p) { return fmt::format("({:.4g}, {:.4g}, {:.4g})", p[0], p[1], p[2]); }
 
-double linear(double s) { return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4); }
-
 // Mean linear colour; `spherical`: of a latitude-longitude map over the sphere.
 Point texture_mean(const io::Texture& t, bool spherical) {
   std::array<double, 256> decoded{};
   for (size_t i = 0; i < 256; ++i) {
     const double s = static_cast<double>(i) / 255;
-    decoded[i] = (t.flags & LUMICUT_SRGB) != 0 ? linear(s) : s;
+    decoded[i] = (t.flags & LUMICUT_SRGB) != 0 ? io::linear_of_srgb(s) : s;
   }
   Point sum{};
   double weights = 0;

@@ -132,6 +132,9 @@ void IlluminationCut::shade_batch(const ShadePoints& batch, std::span<Rgb> radia
   }
   const PhaseTimer timer(context.stats, "pairs");
   add_pairs(points, coarse, error_, radiance, counts, context);
+  Counters shaded;
+  shaded.points = points.size();
+  context.stats.add(shaded);
 }
 
 void IlluminationCut::add_pairs(const PointTree& points, const std::vector<float>& coarse, float error,
@@ -153,7 +156,6 @@ void IlluminationCut::add_pairs(const PointTree& points, const std::vector<float
                            static_cast<float>(work->group_bounds[i / kGroup]) / static_cast<float>(kGroup);
       counts[at] = {work->clusters[i], work->rays[i], static_cast<uint32_t>(std::ceil(bounds))};
     }
-    work->total.points = error == error_ ? n : 0;  // counted once, in the last round
     context.stats.add(work->total);
   });
 }

@@ -8,6 +8,7 @@
 #include "clustering/bounds.h"
 #include "clustering/light_tree.h"
 #include "core/progress.h"
+#include "integrators/integrator.h"
 #include "lights/falloff.h"
 
 namespace lumicut {
@@ -63,6 +64,16 @@ struct LightCuts {
   // of them first.
   void grow(const LightTree& tree, const Accel& accel, const CutOptions& options, const ShadePoints& points,
             size_t first, size_t count);
+
+  // Of point i of those.
+  Rgb radiance_of(size_t i) const {
+    const size_t g = i / kLanes, k = i % kLanes;
+    return {radiance[0][g][k], radiance[1][g][k], radiance[2][g][k]};
+  }
+  PointCounts counts_of(size_t i) const {
+    const size_t g = i / kLanes, k = i % kLanes;
+    return {clusters[g][k], rays[g][k], bounds[g][k]};
+  }
 
   struct HeapItem {
     float excess;  // largest bound over luminance

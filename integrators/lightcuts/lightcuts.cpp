@@ -61,9 +61,8 @@ class Lightcuts final : public Integrator {
         const CutOptions options = options_at(points, first, floor, context);
         cuts->grow(tree_, scene_->accel(), options, points, first, count);
         for (size_t i = 0; i < count; ++i) {
-          const size_t g = i / kLanes, k = i % kLanes;
-          radiance[first + i] = {cuts->radiance[0][g][k], cuts->radiance[1][g][k], cuts->radiance[2][g][k]};
-          const PointCounts c = {cuts->clusters[g][k], cuts->rays[g][k], cuts->bounds[g][k]};
+          radiance[first + i] = cuts->radiance_of(i);
+          const PointCounts c = cuts->counts_of(i);
           if (!counts.empty()) counts[first + i] = c;
           total.clusters += c.clusters, total.rays += c.rays, total.bounds += c.bounds;
         }
@@ -100,10 +99,9 @@ class Lightcuts final : public Integrator {
       cuts->grow(tree_, scene_->accel(), options, asked, begin, end - begin);
       Counters total;
       for (size_t i = 0; i < end - begin; ++i) {
-        const size_t g = i / kLanes, k = i % kLanes;
-        sums[begin / kCutPoints] +=
-            luminance(Rgb{cuts->radiance[0][g][k], cuts->radiance[1][g][k], cuts->radiance[2][g][k]});
-        total.clusters += cuts->clusters[g][k], total.rays += cuts->rays[g][k], total.bounds += cuts->bounds[g][k];
+        const PointCounts c = cuts->counts_of(i);
+        sums[begin / kCutPoints] += luminance(cuts->radiance_of(i));
+        total.clusters += c.clusters, total.rays += c.rays, total.bounds += c.bounds;
       }
       context.stats.add(total);
     });

@@ -23,9 +23,8 @@ void Reconstruction::grow(const LightTree& tree, const Accel& accel, const CutOp
                           Rgb* radiance, PointCounts* counts) {
   cuts_.grow(tree, accel, options, points, first, count);
   for (size_t i = 0; i < count; ++i) {
-    const size_t g = i / kLanes, k = i % kLanes, to = place[first + i];
-    radiance[to] = {cuts_.radiance[0][g][k], cuts_.radiance[1][g][k], cuts_.radiance[2][g][k]};
-    counts[to] = {cuts_.clusters[g][k], cuts_.rays[g][k], cuts_.bounds[g][k]};
+    const size_t to = place[first + i];
+    radiance[to] = cuts_.radiance_of(i), counts[to] = cuts_.counts_of(i);
   }
 }
 
