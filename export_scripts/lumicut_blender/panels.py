@@ -9,11 +9,13 @@ from . import compat, operators, properties, report, runtime
 
 ENGINE = operators.ENGINE
 PLACES = {  # parameter -> panel, label there
-    "seed": ("advanced", "Seed"), "max_depth": ("bounces", "Total"), "clamp_lights": ("clamping", "Lights in Reach"),
+    "seed": ("advanced", "Seed"), "max_depth": ("bounces", "Total"), "clamp_lights": ("clamping", "Near Lights"),
     "clamp_distance": ("clamping", "Distance"), "clamp_relative": ("clamping", "Relative"), "compensate": ("caustics", "Compensate"),
 }
-LABELS = {"vpls": "Lights", "virtual_lights": "Shape", "environment_vpls": "For the World", "direct_share": "For Direct Light",
-          "local_visibility": "Visibility", "coarse_separation": "Coarse Limit"}
+LABELS = {"vpls": "Lights", "virtual_lights": "Shape", "environment_vpls": "For the World", "direct_share": "For Direct",
+          "local_visibility": "Visibility", "coarse_separation": "Coarse Limit", "representatives": "Choices", "representative": "Standing In",
+          "reconstruction": "Reconstruct", "refine_coarse": "Refinements", "material_weight": "Materials", "sampled": "Sampled",
+          "bright": "Bright From", "normal_threshold": "Normals", "block": "Block Size"}
 NAMES_SHOWN = 8  # of one note
 
 
@@ -72,6 +74,15 @@ def wrapped(layout, text, context=None, icon="NONE", width=0):
     column.scale_y = 0.8
     for i, line in enumerate(lines):
         column.label(text=line, icon=icon if i == 0 else "BLANK1" if icon != "NONE" else "NONE")
+
+
+def columns_for(labels, context):
+    """In how many columns buttons stand so that none is cut off: all side by side, or half of them."""
+    scale = bpy.context.preferences.system.ui_scale or 1.0
+    width = context.region.width / scale if context.region is not None else 333
+    blf.size(0, 11 * scale)
+    widest = max(blf.dimensions(0, label)[0] for label in labels) / scale
+    return len(labels) if (widest + 14) * len(labels) <= width - 60 else (len(labels) + 1) // 2
 
 
 def draw_parameters(layout, settings, place):
@@ -135,15 +146,16 @@ class LUMICUT_PT_sampling(Panel, bpy.types.Panel):
             box.operator("lumicut.reload_library", icon="FILE_REFRESH")
             return
         active = properties.active_preset(context.scene.lumicut)
-        row = layout.row(align=True)
-        for key, preset in properties.tables.presets.items():
-            row.operator("lumicut.preset", text=preset.label, depress=key == active).preset = key
+        presets = properties.tables.presets
+        grid = layout.grid_flow(row_major=True, columns=columns_for([p.label for p in presets.values()], context), even_columns=True, align=True)
+        for key, preset in presets.items():
+            grid.operator("lumicut.preset", text=preset.label, depress=key == active).preset = key
         if active is None:
             layout.label(text="Custom: none of these", icon="DOT")
 
 
 def draw_threshold(layout, settings, toggle, prop):
-    row = layout.column(heading="Noise Threshold").row(align=True)
+    row = layout.column(heading="Threshold").row(align=True)
     row.prop(settings, toggle, text="")
     value = row.row()
     value.active = getattr(settings, toggle)
@@ -157,7 +169,7 @@ class LUMICUT_PT_sampling_viewport(LibraryPanel, bpy.types.Panel):
     def draw(self, context):
         layout, settings = split(self.layout), context.scene.lumicut
         draw_threshold(layout, settings, "use_viewport_threshold", "viewport_target_error")
-        layout.prop(settings, "viewport_passes", text="Max Iterations" if settings.use_viewport_threshold else "Iterations")
+        layout.prop(settings, "viewport_passes", text="Iterations")
         layout.prop(settings, "viewport_seconds")
         if lit_by_virtual_lights(settings):
             layout.prop(settings, "viewport_lights")
@@ -172,7 +184,7 @@ class LUMICUT_PT_sampling_render(LibraryPanel, bpy.types.Panel):
         layout, settings = split(self.layout), context.scene.lumicut
         draw_threshold(layout, settings, "use_threshold", "target_error")
         endless = settings.passes == 0 and not settings.use_threshold and settings.max_seconds == 0
-        layout.prop(settings, "passes", text="Max Iterations" if settings.use_threshold else "Iterations")
+        layout.prop(settings, "passes", text="Iterations")
         layout.prop(settings, "samples")
         layout.prop(settings, "max_seconds")
         if not lit_by_virtual_lights(settings):

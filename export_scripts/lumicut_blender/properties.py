@@ -17,7 +17,7 @@ ACCELS = [
 ]
 BUILDERS = [  # of lumicut_scene_desc
     ("DEFAULT", "Default", "Binned splits down to 4096 triangles, agglomeration below, then reinsertion: 5 % in 3 passes"),
-    ("binned-agglomerative+reinsert:20x8", "Best for Long Renders", "As the default, with more reinsertion: 20 % in 8 passes. A few percent less work for each ray"),
+    ("binned-agglomerative+reinsert:20x8", "Long Renders", "As the default, with more reinsertion: 20 % in 8 passes. A few percent less work for each ray"),
     ("binned", "Fastest to Build", "Binned splits alone"),
 ]
 PASSES = {  # of the library's channels: pass name, property, label
