@@ -63,4 +63,11 @@ FoundFile find_beside(const std::string& file, const std::string& name) {
   return {};
 }
 
+std::string missing_file(const std::string& what, const std::string& file, const std::string& name) {
+  if (name.empty()) return fmt::format("the name of the {} is empty", what);
+  std::error_code code;
+  const bool folder = std::filesystem::is_directory(std::filesystem::path(file).parent_path() / name, code);
+  return fmt::format("the {} {} {}", what, shown(name), folder ? "is a folder" : "does not exist");
+}
+
 }  // namespace lumicut::io

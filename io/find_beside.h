@@ -18,4 +18,7 @@ struct FoundFile {
 // where `name` is an absolute path of another machine, its last part beside `file`.
 FoundFile find_beside(const std::string& file, const std::string& name);
 
+// Why nothing was found: "the mesh a.ply does not exist", "the name of the mesh is empty", "... is a folder".
+std::string missing_file(const std::string& what, const std::string& file, const std::string& name);
+
 }  // namespace lumicut::io

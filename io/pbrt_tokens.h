@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <list>
 #include <optional>
 #include <set>
 #include <string>
@@ -16,17 +17,22 @@ struct PbrtToken {
   std::string text;
   bool quoted = false;
   int line = 0;
+  const std::string* file = nullptr;  // as long as the PbrtTokens live
 };
 
 // The words of a file and of those that it includes.
 class PbrtTokens {
  public:
   explicit PbrtTokens(const std::string& path) { open(path); }
+  PbrtTokens(const PbrtTokens&) = delete;
+  PbrtTokens& operator=(const PbrtTokens&) = delete;
 
-  // The words of that file come next. It may be packed by gzip.
+  // The words of that file come next. It may be packed by gzip. Fails where it is among those that include it.
   void open(const std::string& path);
-  std::string where() const;  // of the last word
-  const std::string& file() const { return files_.empty() ? last_ : files_.back().path; }
+  // Of the last word.
+  std::string where() const;
+  int line() const { return line_; }
+  const std::string& file() const { return *file_; }
 
   std::optional<PbrtToken> next();
   const std::optional<PbrtToken>& peek();
@@ -34,16 +40,18 @@ class PbrtTokens {
 
  private:
   struct Source {
-    std::string path, text;
+    const std::string* path;
+    std::string text;
     size_t at;
     int line;
   };
   std::optional<PbrtToken> find();
   std::optional<PbrtToken> read(Source& s);
 
+  std::list<std::string> paths_;
   std::vector<Source> files_;
   std::optional<PbrtToken> ahead_;
-  std::string last_;
+  const std::string* file_ = nullptr;
   int line_ = 1;
   uint64_t bytes_ = 0;
   size_t opened_ = 0;
@@ -52,10 +60,14 @@ class PbrtTokens {
 struct PbrtParameter {
   std::string type, name;
   std::vector<double> numbers;
-  std::vector<std::string> words;
+  std::vector<std::string> words;  // or these, as the type says
+  const std::string* file = nullptr;
+  int line = 0;
+
+  [[noreturn]] void fail(const std::string& text) const;
 };
 
-// Remembers which were asked for: what is left over is told.
+// Remembers which were asked for: what is left over is told. A value of another kind than is asked for is an error.
 class PbrtParameters {
  public:
   std::vector<PbrtParameter> list;

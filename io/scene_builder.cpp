@@ -267,6 +267,52 @@ void SceneBuilder::approximate(const std::string& what) {
   if (told_.insert(what).second) scene.warnings.add("things approximated", path_, shown(what, kLongest));
 }
 
+namespace {
+// A paint and what it is multiplied by.
+std::pair<PaintRef, Vec> without_factor(PaintRef paint) {
+  Vec by{1, 1, 1};
+  while (paint->kind == Paint::Kind::product) {
+    const bool first = paint->a->kind == Paint::Kind::constant;
+    const PaintRef& constant = first ? paint->a : paint->b;
+    if (constant->kind != Paint::Kind::constant) break;
+    for (size_t k = 0; k < 3; ++k) by[k] *= constant->value[k];
+    paint = first ? paint->b : paint->a;
+  }
+  return {paint, by};
+}
+}  // namespace
+
+double SceneBuilder::cut(double value, double low, double high, const ValuePlace& place) {
+  if (value >= low && value <= high) return value;
+  const double taken = std::isnan(value) ? low : std::clamp(value, low, high);
+  const std::string text =
+      fmt::format("{} is {:g}, not {:g} to {:g}; {:g} is taken", shown(place.name, kLongest), value, low, high, taken);
+  constexpr char kKind[] = "values out of range";
+  if (place.line > 0)
+    scene.warnings.add(kKind, place.file, place.line, text);
+  else
+    scene.warnings.add(kKind, place.file, text);
+  return taken;
+}
+PaintRef SceneBuilder::cut(const PaintRef& paint, double low, double high, const ValuePlace& place) {
+  const auto first_outside = [&](const Vec& v, double most) {
+    for (const double x : v)
+      if (!(x >= low && x <= most)) return std::optional<double>(x);
+    return std::optional<double>();
+  };
+  if (const auto value = constant_of(paint)) {
+    const auto outside = first_outside(*value, high);
+    if (!outside) return paint;
+    cut(*outside, low, high, place);
+    Vec kept;
+    for (size_t k = 0; k < 3; ++k) kept[k] = std::clamp((*value)[k], low, high);
+    return constant_paint(kept);
+  }
+  if (const auto outside = first_outside(without_factor(paint).second, 1e6))
+    cut(*outside, 0, 1e6, {place.file, place.line, place.name + ", a factor of a texture"});
+  return paint;
+}
+
 PaintRef SceneBuilder::made(Paint paint) const {
   for (const PaintRef* part : {&paint.a, &paint.b, &paint.share})
     if (*part) paint.size += (*part)->size;
@@ -294,11 +340,11 @@ FoundFile SceneBuilder::find(const std::string& name) const {
   return file;
 }
 
-int32_t SceneBuilder::image(const std::string& name, TextureUse use, uint32_t flags) {
+int32_t SceneBuilder::image(const std::string& name, TextureUse use, uint32_t flags, const char* else_done) {
   const FoundFile file = find(name);
   if (file.path.empty()) {
     scene.warnings.add("missing textures", path_,
-                       fmt::format("the texture {} does not exist; grey stands in", shown(name)));
+                       fmt::format("{}; {}", missing_file("texture", path_, name), else_done));
     return 0;
   }
   if (!file.remark.empty())
@@ -515,25 +561,10 @@ void SceneBuilder::set_bump(const PaintRef& height, double scale, lumicut_materi
   m.normal_texture = add_program(std::move(program)), m.normal_strength = 0;
 }
 
-namespace {
-// A paint and what it is multiplied by.
-std::pair<PaintRef, Vec> without_factor(PaintRef paint) {
-  Vec by{1, 1, 1};
-  while (paint->kind == Paint::Kind::product) {
-    const bool first = paint->a->kind == Paint::Kind::constant;
-    const PaintRef& constant = first ? paint->a : paint->b;
-    if (constant->kind != Paint::Kind::constant) break;
-    for (size_t k = 0; k < 3; ++k) by[k] *= constant->value[k];
-    paint = first ? paint->b : paint->a;
-  }
-  return {paint, by};
-}
-}  // namespace
-
-void SceneBuilder::set_colour(const PaintRef& paint, float* factor, int32_t& texture, double most) {
+void SceneBuilder::set_colour(const PaintRef& paint, float* factor, int32_t& texture) {
   texture = 0;
   if (const auto value = constant_of(paint)) {
-    for (size_t k = 0; k < 3; ++k) factor[k] = static_cast<float>(std::clamp((*value)[k], 0.0, most));
+    for (size_t k = 0; k < 3; ++k) factor[k] = static_cast<float>(std::clamp((*value)[k], 0.0, 1.0));
     return;
   }
   const auto [rest, by] = without_factor(paint);
@@ -631,7 +662,7 @@ void SceneBuilder::add(const std::string& name, const Geometry& geometry, const 
 
 std::vector<Geometry> SceneBuilder::read_meshes(const std::string& name) {
   const FoundFile file = find(name);
-  if (file.path.empty()) fail("", fmt::format("the mesh {} does not exist", shown(name)));
+  if (file.path.empty()) fail("", missing_file("mesh", path_, name));
   if (!has_meshes(file.path)) fail("", fmt::format("the mesh {} is of no format that is read here", shown(name)));
   std::vector<Geometry> out;
   for (Mesh& mesh : read_model_meshes(file.path, scene.warnings)) {

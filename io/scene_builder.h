@@ -79,6 +79,13 @@ PaintRef behind_paint();  // 1 where the back is seen
 // What it is without the place; nothing where it depends on that.
 std::optional<Vec> constant_of(const PaintRef& paint);
 
+// Where a value of a scene stands: for warnings. Line 0: not known.
+struct ValuePlace {
+  std::string file;
+  int line = 0;
+  std::string name;  // "material \"floor\": reflectance"
+};
+
 class SceneBuilder {
  public:
   explicit SceneBuilder(std::string path) : path_(std::move(path)), textures_(scene.textures) {}
@@ -89,8 +96,13 @@ class SceneBuilder {
   void leave_out(const std::string& what);    // once each
   void approximate(const std::string& what);  // once each
 
-  // Image of that name beside the scene's file. 0, with a warning, where it is missing.
-  int32_t image(const std::string& name, TextureUse use, uint32_t flags);
+  // What is out of range is told and cut to it: numbers, and constants and factors of a material's values (the factors of
+  // textures to [0, 1e6]).
+  double cut(double value, double low, double high, const ValuePlace& place);
+  PaintRef cut(const PaintRef& paint, double low, double high, const ValuePlace& place);
+
+  // Image of that name beside the scene's file. 0, with a warning that says what is done, where it is missing.
+  int32_t image(const std::string& name, TextureUse use, uint32_t flags, const char* else_done = "grey stands in");
   // A file beside the scene's, or in a folder that the scene names.
   FoundFile find(const std::string& name) const;
   void search_in(const std::string& folder) { folders_.push_back(folder); }
@@ -106,8 +118,8 @@ class SceneBuilder {
   // The mean of all texels, as if what is computed of them were linear; of places a half.
   Vec mean_of(const PaintRef& paint) const;
 
-  // A colour of a material: factor and texture. Values are cut to [0, most].
-  void set_colour(const PaintRef& paint, float* factor, int32_t& texture, double most = 1);
+  // A colour of a material: factor and texture. Values are cut to [0, 1]: `cut` tells of it.
+  void set_colour(const PaintRef& paint, float* factor, int32_t& texture);
   void set_number(const PaintRef& paint, float& factor, int32_t& texture);
   // Of the emission (a colour), and of an opacity.
   int32_t colour_texture(const PaintRef& paint) { return texture_of(decoded(paint, true)); }

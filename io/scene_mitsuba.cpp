@@ -50,7 +50,33 @@ class Reader {
     std::string where = fmt::format("<{}", node.name());
     for (const char* key : {"type", "name", "id"})
       if (node.attribute(key)) where += fmt::format(" {}=\"{}\"", key, shown(node.attribute(key).value()));
-    build_.fail(where + ">", text);
+    const ValuePlace at = place(node, "");
+    const std::string line = at.line > 0 ? fmt::format("line {}: ", at.line) : "";
+    throw FileError(at.file, fmt::format("{}{}>: {}", line, where, text));
+  }
+  // Where it stands, and what a warning calls a value there.
+  ValuePlace place(const Node& node, const std::string& name) const {
+    const auto file = files_.find(node.root().hash_value());
+    if (file == files_.end()) return {build_.path(), 0, name};
+    const auto& [path, ends] = file->second;
+    const ptrdiff_t at = node.offset_debug();  // below 0: not known
+    const auto line = std::lower_bound(ends.begin(), ends.end(), static_cast<size_t>(std::max<ptrdiff_t>(at, 0)));
+    return {path, at < 0 ? 0 : static_cast<int>(line - ends.begin()) + 1, name};
+  }
+  // Of a material: <bsdf type="plastic">'s.
+  ValuePlace value_place(const Node& node, const std::string& name) const {
+    const Node c = child(node, name);
+    return place(c ? c : node, fmt::format("{} of <bsdf type=\"{}\">", name, shown(text(node, "type"))));
+  }
+  double cut(const Node& node, const char* name, double value, double low, double high) {
+    return build_.cut(value, low, high, value_place(node, name));
+  }
+  Vec cut(const Node& node, const char* name, const Vec& value, double low, double high) {
+    return *constant_of(build_.cut(constant_paint(value), low, high, value_place(node, name)));
+  }
+  // A material's value from 0 to 1.
+  PaintRef share(const Node& node, const char* name, double otherwise, bool numbers_alone = false) {
+    return build_.cut(paint(node, name, otherwise, numbers_alone), 0, 1, value_place(node, name));
   }
 
   // ---- Files
@@ -59,16 +85,25 @@ class Reader {
     if (++depth_ > kDeepest || documents_.size() >= kMostFiles)
       throw FileError(path, "files include each other without end");
     check_regular_file(path);
+    opened_.push_back(path);
     const std::string text = read_whole_file(path, kMostBytes);
     documents_.emplace_back();
     const auto result = documents_.back().load_buffer(text.data(), text.size());
-    if (!result) throw FileError(path, fmt::format("byte {}: {}", result.offset, result.description()));
+    if (!result) {
+      const auto end = text.begin() + std::clamp<ptrdiff_t>(result.offset, 0, static_cast<ptrdiff_t>(text.size()));
+      throw FileError(path, fmt::format("line {}: {}", 1 + std::count(text.begin(), end, '\n'), result.description()));
+    }
+    auto& [name, ends] = files_[documents_.back().hash_value()];
+    name = path;
+    if (result.encoding == pugi::encoding_utf8)  // else offsets are of other bytes
+      for (size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at + 1)) ends.push_back(at);
     const Node root = documents_.back().document_element();
     if (std::string(root.name()) != "scene")
       throw FileError(path, fmt::format("its first element is <{}>, not <scene>", shown(root.name())));
     upgrade_mitsuba(root);
     const std::string folder = std::filesystem::path(path).parent_path().string();
     for (const Node& child : root.children()) gather(child, folder);
+    opened_.pop_back();
     --depth_;
   }
   // Names first: what refers to them may stand before them. `folder`: that of the file.
@@ -78,12 +113,22 @@ class Reader {
     if (name == "default") {
       defaults_.emplace(text(node, "name"), text(node, "value"));
     } else if (name == "include") {
-      const std::string file = text(node, "filename");
-      const FoundFile found = build_.find(file);
-      if (found.path.empty()) fail(node, fmt::format("the file {} does not exist", shown(file)));
-      read_file(found.path);
+      const std::string file = found_file(node, "file", text(node, "filename"));
+      const auto is_this = [&](const std::string& open) {
+        std::error_code code;
+        return open == file || std::filesystem::equivalent(open, file, code);
+      };
+      if (std::any_of(opened_.begin(), opened_.end(), is_this))
+        fail(node,
+             fmt::format("{} includes itself{}", shown(file), is_this(opened_.back()) ? "" : ", by way of others"));
+      read_file(file);
     } else if (name == "path") {
-      build_.search_in((std::filesystem::path(folder) / text(node, "value")).string());
+      const std::string value = text(node, "value");
+      if (value.empty()) fail(node, "names no folder");
+      const auto path = std::filesystem::path(folder) / value;
+      std::error_code code;
+      if (!std::filesystem::is_directory(path, code)) fail(node, fmt::format("{} is no folder", shown(value)));
+      build_.search_in(path.string());
     } else if (name == "alias") {
       const auto known = ids_.find(text(node, "id"));
       if (known == ids_.end()) fail(node, "there is no such id");
@@ -96,7 +141,11 @@ class Reader {
   // Its id and those of what it holds.
   void remember(const Node& node) {
     if (++depth_ > kDeepest) fail(node, "elements lie in each other without end");
-    if (node.attribute("id") && std::string(node.name()) != "ref") ids_[text(node, "id")] = node;
+    if (node.attribute("id") && std::string(node.name()) != "ref")
+      if (const auto [known, fresh] = ids_.emplace(text(node, "id"), node); !fresh) {
+        const ValuePlace other = place(known->second, "");
+        fail(node, fmt::format("line {} of {} has an element of that id, too", other.line, other.file));
+      }
     for (const Node& c : node.children())
       if (c.type() == pugi::node_element) remember(c);
     --depth_;
@@ -145,6 +194,11 @@ class Reader {
     return value;
   }
   std::vector<double> numbers(const Node& node, const std::string& from) const {
+    return numbers_in(from, [&](const std::string& bad) { fail(node, bad); });
+  }
+  // `fail` throws.
+  template <typename Fail>
+  static std::vector<double> numbers_in(const std::string& from, Fail&& fail) {
     std::vector<double> out;
     for (size_t at = 0; at < from.size();) {
       if (from[at] == ' ' || from[at] == ',' || from[at] == '\t' || from[at] == '\n' || from[at] == '\r') {
@@ -155,7 +209,7 @@ class Reader {
       double value = 0;
       const auto [end, error] = std::from_chars(from.data() + at, from.data() + from.size(), value);
       if (error != std::errc() || !std::isfinite(value))
-        fail(node, fmt::format("\"{}\" is no finite number", shown(from.substr(at))));
+        fail(fmt::format("\"{}\" is no finite number", shown(from.substr(at))));
       out.push_back(value);
       at = static_cast<size_t>(end - from.data());
     }
@@ -170,9 +224,19 @@ class Reader {
   // The child that is called so; references are followed.
   Node child(const Node& node, const std::string& name) const {
     asked_[node.hash_value()].insert(name);
+    Node out;
     for (const Node& c : node.children())
-      if (c.attribute("name") && text(c, "name") == name) return std::string(c.name()) == "ref" ? referred(c) : c;
-    return {};
+      if (c.attribute("name") && text(c, "name") == name) {
+        if (out) fail(c, "is given twice");
+        out = c;
+      }
+    return std::string(out.name()) == "ref" ? referred(out) : out;
+  }
+  // Of a file that `what` (a noun) is read from.
+  std::string found_file(const Node& node, const char* what, const std::string& name) const {
+    const FoundFile file = build_.find(name);
+    if (file.path.empty()) fail(node, missing_file(what, build_.path(), name));
+    return file.path;
   }
   // What nothing here asked for.
   void tell_unread(const Node& node, std::initializer_list<const char*> ignored = {}) {
@@ -197,8 +261,9 @@ class Reader {
   }
   double number(const Node& node, const char* name, double otherwise) const {
     const Node c = child(node, name);
-    return c && c.attribute("value") && std::string(c.name()) != "texture" ? number_in(c, "value", otherwise)
-                                                                           : otherwise;
+    if (!c || std::string(c.name()) == "texture") return otherwise;
+    if (!c.attribute("value")) fail(c, "has no value");
+    return number_in(c, "value", otherwise);
   }
   // The same of a material, where a texture may stand.
   double even_number(const Node& node, const char* name, double otherwise) {
@@ -211,7 +276,10 @@ class Reader {
     return c ? text(c, "value") : otherwise;
   }
   bool truth(const Node& node, const char* name, bool otherwise) const {
-    return word(node, name, otherwise ? "true" : "false") == "true";
+    const std::string value = lower(word(node, name, otherwise ? "true" : "false"));
+    if (value != "true" && value != "false")
+      fail(child(node, name), fmt::format("is \"{}\", not true or false", shown(value)));
+    return value == "true";
   }
   Vec vector_of(const Node& node, const Vec& otherwise) const {
     if (!node) return otherwise;
@@ -328,8 +396,11 @@ class Reader {
     }
     if (kind == "spectrum" && node.attribute("type")) {
       const std::string type = text(node, "type");
-      if (type == "blackbody")
-        return blackbody_radiance(std::clamp(number(node, "temperature", 5000), 100.0, 1e6)) * number(node, "scale", 1);
+      if (type == "blackbody") {
+        const double kelvin = number(node, "temperature", 5000);
+        if (!(kelvin >= 100 && kelvin <= 1e6)) fail(node, fmt::format("is a black body of {:g} K", kelvin));
+        return blackbody_radiance(kelvin) * number(node, "scale", 1);
+      }
       if (type == "d65" || type == "uniform") {
         const double scale = number(node, type == "d65" ? "scale" : "value", 1);
         return {scale, scale, scale};
@@ -339,10 +410,8 @@ class Reader {
       return {0.5, 0.5, 0.5};
     }
     if (kind == "spectrum" && node.attribute("filename")) {
-      const std::string name = text(node, "filename");
-      const FoundFile file = build_.find(name);
-      if (file.path.empty()) fail(node, fmt::format("the file {} does not exist", shown(name)));
-      return in_rgb(pairs(node, without_comments(read_whole_file(file.path, kMostBytes))), light);
+      const std::string file = found_file(node, "file", text(node, "filename"));
+      return in_rgb(pairs(node, without_comments(read_whole_file(file, kMostBytes))), light);
     }
     if (kind == "spectrum" && value.find(':') != std::string::npos) {
       std::string plain = value;
@@ -427,8 +496,10 @@ class Reader {
            fmt::format("{}: \"{}\" is no material that is known", name, shown(c ? text(c, "value") : otherwise)));
     return found->second;
   }
-  float relative_index(const Node& node, const std::string& inside) const {
-    return static_cast<float>(std::clamp(index(node, "int_ior", inside) / index(node, "ext_ior", "air"), 0.1, 10.0));
+  float relative_index(const Node& node, const std::string& inside) {
+    const double value = index(node, "int_ior", inside) / index(node, "ext_ior", "air");
+    return static_cast<float>(build_.cut(
+        value, 0.1, 10, place(node, fmt::format("int_ior over ext_ior of <bsdf type=\"{}\">", text(node, "type")))));
   }
   // GGX's alpha is the square of the library's roughness.
   void set_alpha(const Node& node, lumicut_material& m, double usual) {
@@ -438,7 +509,7 @@ class Reader {
       name = "alpha_u", child(node, "alpha_v");
       build_.approximate("roughness that differs along u and v is taken as that along u");
     }
-    build_.set_number(power_paint(paint(node, name, usual, true), 0.5), m.roughness, m.roughness_texture);
+    build_.set_number(power_paint(share(node, name, usual, true), 0.5), m.roughness, m.roughness_texture);
   }
 
   uint32_t bsdf(const Node& node) {
@@ -480,15 +551,13 @@ class Reader {
     };
     if (kind == "diffuse") {
       m = default_material();
-      build_.set_colour(paint(node, "reflectance", 0.5), m.diffuse, m.diffuse_texture);
+      build_.set_colour(share(node, "reflectance", 0.5), m.diffuse, m.diffuse_texture);
     } else if (kind == "plastic" || kind == "roughplastic" || kind == "pplastic") {
       m.ior = relative_index(node, "polypropylene");
-      const PaintRef base = paint(node, "diffuse_reflectance", 0.5);
+      const PaintRef base = share(node, "diffuse_reflectance", 0.5);
       const bool nonlinear = truth(node, "nonlinear", false);
       build_.set_colour(nonlinear ? coated_paint(base, m.ior) : base, m.diffuse, m.diffuse_texture);
-      if (const Node c = child(node, "specular_reflectance"))
-        if (const auto value = constant_of(paint_of(c, false)))
-          for (size_t k = 0; k < 3; ++k) m.specular[k] = static_cast<float>(std::clamp((*value)[k], 0.0, 1.0));
+      if (const auto value = constant_of(share(node, "specular_reflectance", 1))) store(m.specular, *value);
       if (kind != "plastic") set_alpha(node, m, 0.1);
     } else if (kind == "dielectric" || kind == "roughdielectric" || kind == "thindielectric") {
       m.transmission = 1;
@@ -501,28 +570,30 @@ class Reader {
       conductor(node, m);
       if (kind == "roughconductor") set_alpha(node, m, 0.1);
     } else if (kind == "principled" || kind == "principledthin") {
-      build_.set_colour(paint(node, "base_color", 0.5), m.diffuse, m.diffuse_texture);
-      build_.set_number(paint(node, "roughness", 0.5, true), m.roughness, m.roughness_texture);
-      build_.set_number(paint(node, "metallic", 0.0, true), m.metallic, m.metallic_texture);
+      const auto even = [&](const char* key, double otherwise, double most) {
+        return cut(node, key, even_number(node, key, otherwise), 0, most);
+      };
+      build_.set_colour(share(node, "base_color", 0.5), m.diffuse, m.diffuse_texture);
+      build_.set_number(share(node, "roughness", 0.5, true), m.roughness, m.roughness_texture);
+      build_.set_number(share(node, "metallic", 0.0, true), m.metallic, m.metallic_texture);
       if (child(node, "specular")) {
-        const double root = std::sqrt(0.08 * std::clamp(number(node, "specular", 0.5), 0.0, 1.0));
+        const double root = std::sqrt(0.08 * cut(node, "specular", number(node, "specular", 0.5), 0, 1));
         m.ior = static_cast<float>((1 + root) / (1 - root));
       } else {
-        m.ior = static_cast<float>(std::clamp(number(node, "eta", 1.5), 0.1, 10.0));
+        m.ior = static_cast<float>(cut(node, "eta", number(node, "eta", 1.5), 0.1, 10));
       }
-      m.transmission = static_cast<float>(std::clamp(even_number(node, "spec_trans", 0), 0.0, 1.0));
+      m.transmission = static_cast<float>(even("spec_trans", 0, 1));
       if (kind == "principledthin") {
         if (m.transmission > 0) m.flags |= LUMICUT_SHADOWS_PASS;
-        const double through = std::clamp(even_number(node, "diff_trans", 0), 0.0, 2.0) / 2;
-        const PaintRef base = paint(node, "base_color", 0.5);
+        const double through = even("diff_trans", 0, 2) / 2;
+        const PaintRef base = share(node, "base_color", 0.5);
         build_.set_colour(build_.product(base, constant_paint(1 - through)), m.diffuse, m.diffuse_texture);
         if (through > 0)
           build_.set_colour(build_.product(base, constant_paint(through)), m.translucency, m.translucency_texture);
       }
-      m.coat = static_cast<float>(std::clamp(even_number(node, "clearcoat", 0) / 4, 0.0, 1.0));
+      m.coat = static_cast<float>(even("clearcoat", 0, 4) / 4);
       // Its alpha is .1 without gloss, .001 with all of it.
-      m.coat_roughness = static_cast<float>(
-          std::sqrt(0.1 + (0.001 - 0.1) * std::clamp(even_number(node, "clearcoat_gloss", 0), 0.0, 1.0)));
+      m.coat_roughness = static_cast<float>(std::sqrt(0.1 + (0.001 - 0.1) * even("clearcoat_gloss", 0, 1)));
       m.flags |= LUMICUT_BURLEY;
       for (const char* key : {"anisotropic", "sheen", "sheen_tint", "flatness", "spec_tint"})
         if (even_number(node, key, 0) > 0) build_.leave_out(fmt::format("{} of {}", key, kind));
@@ -533,10 +604,13 @@ class Reader {
       m = default_material();
       build_.approximate("hair is diffuse, of its colour");
       const Node absorption = child(node, "sigma_a");
-      const double scale = number(node, "scale", 1);
-      const Vec sigma = absorption ? build_.mean_of(paint_of(absorption, true))
-                                   : hair_absorption(number(node, "eumelanin", 1.3), number(node, "pheomelanin", 0.2));
-      store(m.diffuse, hair_colour(sigma * scale, std::clamp(number(node, "azimuthal_roughness", 0.3), 0.0, 1.0)));
+      const auto amount = [&](const char* key, double otherwise, double most) {
+        return cut(node, key, number(node, key, otherwise), 0, most);
+      };
+      const double scale = amount("scale", 1, 1e6);
+      const Vec sigma = absorption ? cut(node, "sigma_a", build_.mean_of(paint_of(absorption, true)), 0, 1e9)
+                                   : hair_absorption(amount("eumelanin", 1.3, 1e6), amount("pheomelanin", 0.2, 1e6));
+      store(m.diffuse, hair_colour(sigma * scale, amount("azimuthal_roughness", 0.3, 1)));
       for (const char* key : {"longitudinal_roughness", "scale_tilt", "int_ior", "ext_ior"}) child(node, key);
     } else {
       build_.approximate(fmt::format("bsdfs of the kind {} are diffuse", kind));
@@ -550,7 +624,7 @@ class Reader {
   void conductor(const Node& node, lumicut_material& m) {
     const std::string material = word(node, "material", child(node, "eta") ? "" : "Cu");
     if (material == "none") {
-      build_.set_colour(paint(node, "specular_reflectance", 1.0), m.diffuse, m.diffuse_texture);
+      build_.set_colour(share(node, "specular_reflectance", 1.0), m.diffuse, m.diffuse_texture);
       return;
     }
     std::pair<Vec, Vec> both = *named_metal("Cu");
@@ -560,10 +634,10 @@ class Reader {
       else
         build_.approximate(fmt::format("the metal {} is copper", material));
     }
-    if (const Node c = child(node, "eta")) both.first = colour(c, false);
-    if (const Node c = child(node, "k")) both.second = colour(c, false);
+    if (const Node c = child(node, "eta")) both.first = cut(node, "eta", colour(c, false), 0, 1e6);
+    if (const Node c = child(node, "k")) both.second = cut(node, "k", colour(c, false), 0, 1e6);
     const Metal metal = metal_of(both.first, both.second);
-    const Vec tint = constant_of(paint(node, "specular_reflectance", 1.0)).value_or(Vec{1, 1, 1});
+    const Vec tint = constant_of(share(node, "specular_reflectance", 1.0)).value_or(Vec{1, 1, 1});
     for (size_t k = 0; k < 3; ++k) {
       m.diffuse[k] = static_cast<float>(std::clamp(metal.colour[k] * tint[k], 0.0, 1.0));
       m.specular_tint[k] = static_cast<float>(metal.tint[k]);
@@ -576,21 +650,22 @@ class Reader {
     const uint32_t of = bsdf(c);
     lumicut_material m = build_.scene.materials[of].values;
     if (kind == "mask") {
-      const PaintRef opacity = paint(node, "opacity", 0.5, true);
+      const PaintRef opacity = share(node, "opacity", 0.5, true);
       if (const auto value = constant_of(opacity))
-        m.opacity = std::max(kHole, static_cast<float>(std::clamp((*value)[0], 0.0, 1.0)));
+        m.opacity = std::max(kHole, static_cast<float>((*value)[0]));
       else
         m.opacity_texture = build_.number_texture(opacity);
     } else if (kind == "normalmap") {
       const Node map = texture_in(node);
-      if (map) m.normal_texture = build_.image(word(map, "filename", ""), TextureUse::vectors, 0);
+      if (map)
+        m.normal_texture = build_.image(word(map, "filename", ""), TextureUse::vectors, 0, "the surface stays smooth");
     } else if (kind == "bumpmap") {
       const Node map = texture_in(node);
-      if (map) build_.set_bump(paint_of(map, true), std::clamp(number(node, "scale", 1), -1e6, 1e6), m);
+      if (map) build_.set_bump(paint_of(map, true), cut(node, "scale", number(node, "scale", 1), -1e6, 1e6), m);
     } else {
       const Node second = inner(node, 1);
       if (!second) fail(node, "holds one bsdf alone");
-      return build_.mix_materials(name, of, bsdf(second), paint(node, "weight", 0.5, true));
+      return build_.mix_materials(name, of, bsdf(second), share(node, "weight", 0.5, true));
     }
     return build_.add_material(name, m);
   }
@@ -663,6 +738,7 @@ class Reader {
       place = place * stand;
       all.push_back(upside_down(cylinder_geometry(number(node, "radius", 1), 0, length(p1 - p0), 2 * kPi)));
     } else if (kind == "obj" || kind == "ply" || kind == "serialized") {
+      found_file(node, "mesh", word(node, "filename", ""));
       all = kind == "serialized" ? serialized(node) : build_.read_meshes(word(node, "filename", ""));
       const bool turn = truth(node, "flip_tex_coords", kind == "obj") != (kind == "obj");
       const bool flat = truth(node, "face_normals", false);
@@ -673,6 +749,7 @@ class Reader {
     } else if (kind == "bsplinecurve" || kind == "linearcurve") {
       all.push_back(curves(node, place, kind == "linearcurve"));
       place = {};
+      if (all[0].indices.empty()) build_.leave_out("curves without length or width");
     } else {
       build_.leave_out(fmt::format("shapes of the kind {}", kind));
       --depth_;
@@ -695,7 +772,7 @@ class Reader {
         if (radiance && std::string(radiance.name()) == "texture") {
           material = build_.with_emission(material, {1, 1, 1}, build_.colour_texture(paint_of(radiance, false)), false);
         } else {
-          material = build_.with_emission(material, radiance ? colour(radiance, true) : Vec{1, 1, 1}, 0, false);
+          material = build_.with_emission(material, light_colour(c, "radiance"), 0, false);
         }
         tell_unread(c);
         key.clear();
@@ -713,34 +790,47 @@ class Reader {
   }
   // Points and radii a line, curves apart by empty lines. Their places are moved by to_world, their radii are not.
   Geometry curves(const Node& node, const Affine& place, bool straight) {
-    const std::string name = word(node, "filename", "");
-    const FoundFile file = build_.find(name);
-    if (file.path.empty()) fail(node, fmt::format("the file {} does not exist", shown(name)));
-    check_regular_file(file.path);
-    const std::string all = plain_text(read_whole_file(file.path, kMostBytes), file.path);
+    const std::string path = found_file(node, "file of curves", word(node, "filename", ""));
+    check_regular_file(path);
+    const std::string all = plain_text(read_whole_file(path, kMostBytes), path);
     std::vector<Strand> strands(1);
-    size_t line = 0;
-    for (size_t at = 0; at < all.size(); ++line) {
-      const size_t end = std::min(all.find('\n', at), all.size());
-      const auto list = numbers(node, all.substr(at, end - at));
-      at = end + 1;
-      if (list.empty()) {
-        if (!strands.back().empty()) strands.emplace_back();
-        continue;
+    size_t line = 1, points = 0;
+    const auto bad = [&](const std::string& what) { throw FileError(path, fmt::format("line {}: {}", line, what)); };
+    const auto finish = [&](Strand& strand) {
+      if (strand.empty()) return;
+      const size_t least = straight ? 2 : 4;
+      if (strand.size() < least)
+        bad(fmt::format("a curve of {} points ends here; a {} has at least {}", strand.size(), text(node, "type"),
+                        least));
+      const auto is_first = [&](const CurvePoint& p) { return p.place == strand[0].place; };
+      const auto is_thin = [](const CurvePoint& p) { return !(p.radius > 0); };
+      points += strand.size();
+      if (std::all_of(strand.begin(), strand.end(), is_first) || std::all_of(strand.begin(), strand.end(), is_thin)) {
+        build_.leave_out("curves without length or width");
+        return strand.clear();
       }
-      if (list.size() != 4 || !(list[3] >= 0))
-        throw FileError(file.path, fmt::format("line {}: is no point and radius", line + 1));
-      strands.back().push_back({place.point({list[0], list[1], list[2]}), list[3], {0, 0, 0}});
-    }
-    if (strands.back().empty()) strands.pop_back();
-    if (strands.empty()) throw FileError(file.path, "has no points");
-    for (Strand& strand : strands) {
-      if (strand.size() < (straight ? 2 : 4))
-        throw FileError(file.path, fmt::format("has a curve of {} points", strand.size()));
       if (!straight) strand = bezier_strand(bezier_of_bspline(strand, 3), 3);
       curve_points_ += strand.size();
-      if (curve_points_ > kMostCurvePoints) throw FileError(file.path, "has too many curves");
+      if (curve_points_ > kMostCurvePoints) bad(fmt::format("more than {} points of curves", kMostCurvePoints));
+      strands.emplace_back();
+    };
+    for (size_t at = 0; at < all.size(); ++line) {
+      const size_t end = std::min(all.find('\n', at), all.size());
+      const auto list = numbers_in(all.substr(at, end - at), bad);
+      at = end + 1;
+      if (list.empty()) {
+        finish(strands.back());
+        continue;
+      }
+      if (list.size() != 4) bad(fmt::format("has {} numbers, not the four of a point and its radius", list.size()));
+      if (!(list[3] >= 0 && list[3] <= kLargestCoordinate)) bad(fmt::format("has a radius of {:g}", list[3]));
+      const Vec at_world = place.point({list[0], list[1], list[2]});
+      for (const double x : at_world)
+        if (!(std::abs(x) < kLargestCoordinate)) bad(fmt::format("has a coordinate of {:g} in the world", x));
+      strands.back().push_back({at_world, list[3], {0, 0, 0}});
     }
+    finish(strands.back());
+    if (points == 0) throw FileError(path, "has no points");
     return curve_geometry(strands);
   }
   // Even media that glass holds: what they absorb.
@@ -751,7 +841,10 @@ class Reader {
       const Vec all = extinction ? colour(extinction, false) : Vec{1, 1, 1};
       const Vec scattered = albedo ? colour(albedo, false) : Vec{0.75, 0.75, 0.75};
       Vec absorbed = all * number(medium, "scale", 1);
-      for (size_t k = 0; k < 3; ++k) absorbed[k] *= 1 - std::clamp(scattered[k], 0.0, 1.0);
+      const auto at = [&](const char* name) { return place(medium, fmt::format("{} of a medium", name)); };
+      const auto kept = *constant_of(build_.cut(constant_paint(scattered), 0, 1, at("albedo")));
+      for (size_t k = 0; k < 3; ++k) absorbed[k] *= 1 - kept[k];
+      absorbed = *constant_of(build_.cut(constant_paint(absorbed), 0, 1e15, at("sigma_t less what is scattered")));
       glass = build_.with_absorption(material, absorbed);
       if (glass && std::max({scattered[0], scattered[1], scattered[2]}) > 0)
         build_.leave_out("scattering inside of glass");
@@ -760,12 +853,10 @@ class Reader {
     return glass.value_or(material);
   }
   std::vector<Geometry> serialized(const Node& node) {
-    const std::string name = word(node, "filename", "");
-    const FoundFile file = build_.find(name);
-    if (file.path.empty()) fail(node, fmt::format("the mesh {} does not exist", shown(name)));
+    const std::string path = found_file(node, "mesh", word(node, "filename", ""));
     const double index = number(node, "shape_index", 0);
     if (!(index >= 0 && index < 1e9)) fail(node, fmt::format("its shape_index is {}", index));
-    return {read_serialized_mesh(file.path, static_cast<size_t>(index))};
+    return {read_serialized_mesh(path, static_cast<size_t>(index))};
   }
   void instance(const Node& node, const Affine& place) {
     for (const Node& c : node.children()) {
@@ -904,7 +995,7 @@ class Reader {
         const double scale = number(node, "scale", 1);
         if (!(scale >= 0 && scale <= 1e15)) fail(node, fmt::format("its scale is {}", scale));
         rgb = {scale, scale, scale};
-        e.texture = build_.image(word(node, "filename", ""), TextureUse::radiance, 0);
+        e.texture = build_.image(word(node, "filename", ""), TextureUse::radiance, 0, "white stands in");
         if (place.determinant() < 0) build_.approximate("mirrored environments are not mirrored");
         // Its local y is up, and the picture's middle lies along z.
         const Vec rows[3] = {unit(place.column(2)), unit(place.column(0)), unit(place.column(1))};
@@ -922,6 +1013,8 @@ class Reader {
 
   SceneBuilder build_;
   std::list<pugi::xml_document> documents_;
+  std::map<size_t, std::pair<std::string, std::vector<size_t>>> files_;  // by document: path, and where lines end
+  std::vector<std::string> opened_;                                      // files that include the one that is read
   std::map<std::string, std::string> defaults_;
   std::map<std::string, Node> ids_;
   std::vector<Node> scene_;  // in the order of the files

@@ -43,6 +43,13 @@ struct State {
   std::map<std::string, PbrtParameters> given;  // by Attribute to shapes, lights, materials ...
 };
 
+// What AttributeBegin, TransformBegin or ObjectBegin kept.
+struct Opened {
+  State state;
+  std::string word, file;
+  int line;
+};
+
 // Curves that follow each other under one state: one mesh.
 struct Curves {
   std::vector<Strand> strands;
@@ -74,7 +81,7 @@ class Reader {
       if (token->quoted) tokens_.fail(fmt::format("\"{}\" stands where a statement begins", shown(token->text)));
       statement(token->text);
     }
-    if (!stack_.empty()) tokens_.fail("an AttributeBegin has no end");
+    if (!stack_.empty()) tokens_.fail(fmt::format("the file ends, and {} has no end", opened(stack_.back())));
     put_curves();
     if (has_camera_) finish_camera();
     return build_.finish(has_camera_);
@@ -104,6 +111,11 @@ class Reader {
   // With those that Attribute gives to all statements of that kind.
   Parameters parameters(const char* target = "") {
     Parameters out{pbrt_parameters(tokens_), {}};
+    std::set<std::string> names;
+    for (const PbrtParameter& p : out.list)
+      if (!names.insert(p.name).second)
+        build_.scene.warnings.add("repeated parameters", *p.file, p.line,
+                                  fmt::format("\"{}\" is given twice; the first counts", shown(p.name)));
     if (const auto given = state_.given.find(target); given != state_.given.end())
       for (const PbrtParameter& p : given->second.list) {
         out.list.push_back(p);
@@ -117,7 +129,30 @@ class Reader {
       if (p.given.count(name) == 0) build_.leave_out(fmt::format("\"{}\" of {}", name, what));
   }
 
+  // For warnings of values that are cut.
+  ValuePlace at(const std::string& what, const std::string& key) const {
+    return {tokens_.file(), tokens_.line(), what + ": " + key};
+  }
+  ValuePlace of_material(const std::string& name, const std::string& key) const {
+    return at(fmt::format("material \"{}\"", shown(name)), key);
+  }
+
   // ---- Statements
+
+  void push(const std::string& word) {
+    if (stack_.size() >= kDeepest) tokens_.fail("attributes lie in each other without end");
+    stack_.push_back({state_, word, tokens_.file(), tokens_.line()});
+  }
+  static std::string opened(const Opened& o) { return fmt::format("the {} of line {} of {}", o.word, o.line, o.file); }
+  // What `end` closes: of an object or not.
+  State pop(const std::string& end) {
+    if (stack_.empty()) tokens_.fail(fmt::format("{} without its beginning", end));
+    if ((stack_.back().word == "ObjectBegin") != (end == "ObjectEnd"))
+      tokens_.fail(fmt::format("{} where {} has no end yet", end, opened(stack_.back())));
+    State out = std::move(stack_.back().state);
+    stack_.pop_back();
+    return out;
+  }
 
   void statement(const std::string& word) {
     const auto times = [&](const Affine& m) {
@@ -154,16 +189,13 @@ class Reader {
     } else if (word == "ReverseOrientation") {
       state_.reversed = !state_.reversed;
     } else if (word == "AttributeBegin" || word == "TransformBegin") {
-      if (stack_.size() >= kDeepest) tokens_.fail("attributes lie in each other without end");
-      stack_.push_back(state_);
+      push(word);
     } else if (word == "AttributeEnd" || word == "TransformEnd") {
-      if (stack_.empty()) tokens_.fail(fmt::format("{} without its beginning", word));
-      const Affine ctm = stack_.back().ctm;
+      State before = pop(word);
       if (word == "TransformEnd")
-        state_.ctm = ctm;
+        state_.ctm = before.ctm;
       else
-        state_ = std::move(stack_.back());
-      stack_.pop_back();
+        state_ = std::move(before);
     } else if (word == "Attribute") {
       const std::string target = quoted("Attribute");
       static const std::set<std::string> kTargets = {"shape", "light", "material", "medium", "texture"};
@@ -180,20 +212,19 @@ class Reader {
     } else if (word == "Include" || word == "Import") {
       const std::string name = quoted(word.c_str());
       const FoundFile file = find_beside(build_.path(), name);
-      if (file.path.empty()) tokens_.fail(fmt::format("the file {} does not exist", shown(name)));
+      if (file.path.empty()) tokens_.fail(missing_file("file", build_.path(), name));
       include(file.path);
     } else if (word == "ObjectBegin") {
       if (object_) tokens_.fail("ObjectBegin inside of an object");
-      stack_.push_back(state_);
+      push(word);
       put_curves();
       object_ = quoted("ObjectBegin");
       objects_[*object_].clear();
     } else if (word == "ObjectEnd") {
-      if (!object_ || stack_.empty()) tokens_.fail("ObjectEnd without its beginning");
+      State before = pop(word);
       put_curves();
       object_.reset();
-      state_ = std::move(stack_.back());
-      stack_.pop_back();
+      state_ = std::move(before);
     } else if (word == "ObjectInstance") {
       instance(quoted("ObjectInstance"));
     } else if (word == "ActiveTransform") {
@@ -372,6 +403,7 @@ class Reader {
       PbrtTokens words(file.path);
       while (const auto token = words.next()) values.push_back(pbrt_number(words, *token, "a spectrum's file"));
     }
+    if (values.size() % 2 != 0) p.fail(fmt::format("has {} numbers, not pairs", values.size()));
     for (size_t i = 0; i + 1 < values.size(); i += 2) out.emplace_back(values[i], values[i + 1]);
     std::sort(out.begin(), out.end());
     return out;
@@ -389,8 +421,11 @@ class Reader {
         tokens_.fail(fmt::format("a black body of {} K", p->numbers[0]));
       return blackbody(p->numbers[0]);
     }
-    if (p->type == "float" && !p->numbers.empty()) return {p->numbers[0], p->numbers[0], p->numbers[0]};
-    if (p->type != "spectrum") return otherwise;
+    if (p->type == "float") {
+      const double value = one_number(*p);
+      return {value, value, value};
+    }
+    if (p->type != "spectrum") p->fail("is no colour");
     if (!p->words.empty()) {
       const std::string& name = p->words[0];
       if (name == "stdillum-A") return blackbody(2856);
@@ -412,6 +447,10 @@ class Reader {
       return white > 0 ? rgb * (1 / white) : rgb;
     }
     return rgb_of_reflectance(spectrum);
+  }
+  static double one_number(const PbrtParameter& p) {
+    if (p.numbers.size() != 1) p.fail(fmt::format("has {} numbers instead of one", p.numbers.size()));
+    return p.numbers[0];
   }
   static std::optional<double> named_glass(const std::string& name) {
     static const std::map<std::string, double> kGlasses = {
@@ -437,6 +476,20 @@ class Reader {
       return constant_paint(otherwise);
     }
     return constant_paint(colour(given, {otherwise, otherwise, otherwise}, Use::reflectance));
+  }
+  // Of a material, 0 to 1.
+  PaintRef share(const std::string& material, const Parameters& p, const std::string& name, double otherwise,
+                 bool of_numbers = false) {
+    return build_.cut(paint(p, name.c_str(), otherwise, of_numbers), 0, 1, of_material(material, name));
+  }
+  // Of a material; what pbrt may have as a texture, and is even here.
+  double even_number(const std::string& material, const Parameters& p, const char* name, double otherwise, double low,
+                     double high) {
+    const PbrtParameter* given = p.find(name);
+    if (given == nullptr || given->type != "texture")
+      return build_.cut(p.number(name, otherwise), low, high, of_material(material, name));
+    build_.approximate(fmt::format("textures of {} are their mean", name));
+    return build_.cut(build_.mean_of(paint(p, name, otherwise, true))[0], low, high, of_material(material, name));
   }
 
   void texture(const std::string& name, const std::string& type, const std::string& kind, const Parameters& p) {
@@ -535,29 +588,33 @@ class Reader {
   // ---- Materials
 
   // The library's roughness is the root of GGX's alpha, which is the root of pbrt's roughness where that is remapped.
-  PaintRef roughness(const Parameters& p, const std::string& prefix) {
-    PaintRef rough = paint(p, (prefix + "roughness").c_str(), 0, true);
+  PaintRef roughness(const std::string& name, const Parameters& p, const std::string& prefix) {
+    PaintRef rough = share(name, p, prefix + "roughness", 0, true);
     const bool u = p.find(prefix + "uroughness") != nullptr, v = p.find(prefix + "vroughness") != nullptr;
     if (u || v) {
-      const PaintRef along_v = paint(p, (prefix + (v ? "vroughness" : "uroughness")).c_str(), 0, true);
-      rough = paint(p, (prefix + (u ? "uroughness" : "vroughness")).c_str(), 0, true);
+      const PaintRef along_v = share(name, p, prefix + (v ? "vroughness" : "uroughness"), 0, true);
+      rough = u == v ? share(name, p, prefix + "uroughness", 0, true) : along_v;
       if (rough != along_v && (!constant_of(rough) || constant_of(rough) != constant_of(along_v)))
         build_.approximate("roughness that differs along u and v is taken as that along u");
     }
     return power_paint(rough, p.truth("remaproughness", true) ? 0.25 : 0.5);
   }
-  void set_roughness(const Parameters& p, const std::string& prefix, lumicut_material& m) {
-    build_.set_number(roughness(p, prefix), m.roughness, m.roughness_texture);
+  void set_roughness(const std::string& name, const Parameters& p, const std::string& prefix, lumicut_material& m) {
+    build_.set_number(roughness(name, p, prefix), m.roughness, m.roughness_texture);
   }
-  double index(const Parameters& p, const char* name, double otherwise) {
+  double index(const std::string& material, const Parameters& p, const char* name, double otherwise) {
     const Vec eta = colour(p.find(name), {otherwise, otherwise, otherwise}, Use::number);
-    return std::clamp(eta[1], 0.1, 10.0);
+    return build_.cut(eta[1], 0.1, 10, of_material(material, name));
+  }
+  Vec cut(Vec values, double low, double high, const ValuePlace& place) {
+    return *constant_of(build_.cut(constant_paint(values), low, high, place));
   }
   // `outside`: index of what it lies in.
-  void set_metal(const Parameters& p, const std::string& prefix, double outside, lumicut_material& m) {
+  void set_metal(const std::string& name, const Parameters& p, const std::string& prefix, double outside,
+                 lumicut_material& m) {
     m.metallic = 1;
     if (p.find("reflectance") != nullptr) {
-      build_.set_colour(paint(p, "reflectance", 0.5), m.diffuse, m.diffuse_texture);
+      build_.set_colour(share(name, p, "reflectance", 0.5), m.diffuse, m.diffuse_texture);
       return;
     }
     const PbrtParameter *eta = p.find(prefix + "eta"), *k = p.find(prefix + "k");
@@ -565,13 +622,13 @@ class Reader {
     const auto one = [&](const PbrtParameter* given, Vec& out, bool absorbing) {
       if (given == nullptr) return;
       if (given->type == "spectrum" && !given->words.empty() && given->words[0].starts_with("metal-")) {
-        const std::string name = given->words[0].substr(6, given->words[0].rfind('-') - 6);
-        if (const auto known = named_metal(name)) {
+        const std::string metal = given->words[0].substr(6, given->words[0].rfind('-') - 6);
+        if (const auto known = named_metal(metal)) {
           out = absorbing ? known->second : known->first;
           return;
         }
       }
-      out = colour(given, out, Use::number);
+      out = cut(colour(given, out, Use::number), 0, 1e6, of_material(name, given->name));
     };
     one(eta, both.first, false), one(k, both.second, true);
     const Metal metal = metal_of(both.first * (1 / outside), both.second * (1 / outside));
@@ -585,48 +642,52 @@ class Reader {
       for (float& c : m.specular) c = 1;
       for (float& c : m.diffuse) c = 1;
     };
+    const auto cut_share = [&](const char* key, double otherwise) { return share(name, p, key, otherwise); };
     if (kind == "diffuse") {
-      build_.set_colour(paint(p, "reflectance", 0.5), m.diffuse, m.diffuse_texture);
+      build_.set_colour(cut_share("reflectance", 0.5), m.diffuse, m.diffuse_texture);
     } else if (kind == "coateddiffuse") {
       ggx();
-      m.ior = static_cast<float>(index(p, "eta", 1.5));
-      build_.set_colour(coated_paint(paint(p, "reflectance", 0.5), m.ior), m.diffuse, m.diffuse_texture);
-      set_roughness(p, "", m);
+      m.ior = static_cast<float>(index(name, p, "eta", 1.5));
+      build_.set_colour(coated_paint(cut_share("reflectance", 0.5), m.ior), m.diffuse, m.diffuse_texture);
+      set_roughness(name, p, "", m);
     } else if (kind == "conductor") {
       ggx();
-      set_metal(p, "", 1, m);
-      set_roughness(p, "", m);
+      set_metal(name, p, "", 1, m);
+      set_roughness(name, p, "", m);
     } else if (kind == "coatedconductor") {
       ggx();
-      m.coat = 1, m.coat_ior = static_cast<float>(std::max(1.0, index(p, "interface.eta", 1.5)));
-      set_metal(p, "conductor.", m.coat_ior, m);
-      set_roughness(p, "conductor.", m);
-      const PaintRef rough = roughness(p, "interface.");
+      m.coat = 1, m.coat_ior = static_cast<float>(std::max(1.0, index(name, p, "interface.eta", 1.5)));
+      set_metal(name, p, "conductor.", m.coat_ior, m);
+      set_roughness(name, p, "conductor.", m);
+      const PaintRef rough = roughness(name, p, "interface.");
       if (!constant_of(rough)) build_.approximate("textures of interface.roughness are their mean");
       m.coat_roughness = static_cast<float>(std::clamp(build_.mean_of(rough)[0], 0.0, 1.0));
     } else if (kind == "dielectric" || kind == "thindielectric") {
       ggx();
-      m.transmission = 1, m.ior = static_cast<float>(index(p, "eta", 1.5));
+      m.transmission = 1, m.ior = static_cast<float>(index(name, p, "eta", 1.5));
       if (kind == "dielectric")
-        set_roughness(p, "", m);
+        set_roughness(name, p, "", m);
       else
         m.roughness = 0, m.flags |= LUMICUT_SHADOWS_PASS;
     } else if (kind == "diffusetransmission") {
-      build_.set_colour(paint(p, "reflectance", 0.25), m.diffuse, m.diffuse_texture);
-      build_.set_colour(paint(p, "transmittance", 0.25), m.translucency, m.translucency_texture);
-      if (p.number("scale", 1) != 1)
-        for (size_t k = 0; k < 3; ++k) {
-          const auto scale = static_cast<float>(std::clamp(p.number("scale", 1), 0.0, 1e6));
-          m.diffuse[k] *= scale, m.translucency[k] *= scale;
-          if (m.diffuse_texture == 0) m.diffuse[k] = std::min(m.diffuse[k], 1.0f);
-          if (m.translucency_texture == 0) m.translucency[k] = std::min(m.translucency[k], 1.0f);
-        }
+      build_.set_colour(cut_share("reflectance", 0.25), m.diffuse, m.diffuse_texture);
+      build_.set_colour(cut_share("transmittance", 0.25), m.translucency, m.translucency_texture);
+      const auto scale = static_cast<float>(build_.cut(p.number("scale", 1), 0, 1e6, of_material(name, "scale")));
+      const auto scaled = [&](float* colour, int32_t texture, const char* key) {
+        for (size_t k = 0; k < 3; ++k) colour[k] *= scale;
+        if (texture != 0 || std::max({colour[0], colour[1], colour[2]}) <= 1) return;
+        store(colour,
+              cut(Vec{colour[0], colour[1], colour[2]}, 0, 1, of_material(name, fmt::format("scale times {}", key))));
+      };
+      if (scale != 1)
+        scaled(m.diffuse, m.diffuse_texture, "reflectance"),
+            scaled(m.translucency, m.translucency_texture, "transmittance");
     } else if (kind == "mix") {
       const PbrtParameter* both = p.find("materials");
       if (both == nullptr || both->words.size() != 2)
         tokens_.fail(
             fmt::format("the material \"{}\", a mix, names {} materials", shown(name), both ? both->words.size() : 0));
-      const PaintRef amount = paint(p, "amount", 0.5, true);
+      const PaintRef amount = share(name, p, "amount", 0.5, true);
       const uint32_t first = named(both->words[0]).first, second = named(both->words[1]).first;
       finish_material(kind, p);
       return build_.mix_materials(name, first, second, amount);
@@ -634,14 +695,14 @@ class Reader {
       m.opacity = kHole;  // in mixes; shapes of it alone are not there
     } else if (kind == "hair") {
       build_.approximate("hair is diffuse, of its colour");
-      set_hair(p, m);
+      set_hair(name, p, m);
     } else {
       build_.approximate(fmt::format("the material \"{}\" of the kind {} is diffuse", name, kind));
-      build_.set_colour(paint(p, "reflectance", 0.5), m.diffuse, m.diffuse_texture);
+      build_.set_colour(cut_share("reflectance", 0.5), m.diffuse, m.diffuse_texture);
       for (const PbrtParameter& q : p.list) p.ignore(q.name);
     }
     if (const std::string map = p.word("normalmap", ""); !map.empty()) {
-      m.normal_texture = build_.image(map, TextureUse::vectors, 0);
+      m.normal_texture = build_.image(map, TextureUse::vectors, 0, "the surface stays smooth");
       if (m.normal_texture != 0) m.normal_strength = 1;
       if (p.find("displacement") != nullptr) build_.leave_out("displacement beside a normal map");
     } else {
@@ -650,22 +711,31 @@ class Reader {
     finish_material(kind, p);
     return build_.add_material(name, m);
   }
-  void set_hair(const Parameters& p, lumicut_material& m) {
+  void set_hair(const std::string& material, const Parameters& p, lumicut_material& m) {
     const char* name = p.find("reflectance") != nullptr ? "reflectance" : "color";
     const PbrtParameter* absorption = p.find("sigma_a");
     for (const char* ignored : {"beta_m", "alpha", "eta"}) p.ignore(ignored);
-    const double azimuthal = std::clamp(p.number("beta_n", 0.3), 0.0, 1.0);
+    const double azimuthal = even_number(material, p, "beta_n", 0.3, 0, 1);
     const bool melanin = p.find("eumelanin") != nullptr || p.find("pheomelanin") != nullptr;
-    if (absorption == nullptr && p.find(name) != nullptr)
-      return build_.set_colour(paint(p, name, 0.5), m.diffuse, m.diffuse_texture);
-    if (absorption != nullptr && absorption->type == "texture") {
-      build_.approximate("textures of sigma_a are their mean");
-      return store(m.diffuse, hair_colour(build_.mean_of(paint(p, "sigma_a", 1)), azimuthal));
+    if (absorption == nullptr && p.find(name) != nullptr) {
+      if (melanin) build_.leave_out("melanin of hair that has a colour");
+      return build_.set_colour(share(material, p, name, 0.5), m.diffuse, m.diffuse_texture);
     }
-    const Vec sigma = absorption != nullptr
-                          ? colour(absorption, {1, 1, 1}, Use::number)
-                          : hair_absorption(p.number("eumelanin", melanin ? 0 : 1.3), p.number("pheomelanin", 0));
-    store(m.diffuse, hair_colour(sigma, azimuthal));
+    if (absorption != nullptr && (melanin || p.find(name) != nullptr))
+      build_.leave_out("melanin and colour of hair that has a sigma_a");
+    Vec sigma;
+    if (absorption == nullptr) {
+      const auto amount = [&](const char* key, double otherwise) {
+        return even_number(material, p, key, otherwise, 0, 1e6);
+      };
+      sigma = hair_absorption(amount("eumelanin", melanin ? 0 : 1.3), amount("pheomelanin", 0));
+    } else if (absorption->type == "texture") {
+      build_.approximate("textures of sigma_a are their mean");
+      sigma = build_.mean_of(paint(p, "sigma_a", 1));
+    } else {
+      sigma = colour(absorption, {1, 1, 1}, Use::number);
+    }
+    store(m.diffuse, hair_colour(cut(sigma, 0, 1e9, of_material(material, "sigma_a")), azimuthal));
   }
   void finish_material(const std::string& kind, const Parameters& p) {
     p.ignore("type"), p.ignore("maxdepth"), p.ignore("nsamples");
@@ -689,6 +759,11 @@ class Reader {
     const std::string name = fmt::format("LightSource \"{}\" ({})", kind, tokens_.where());
     lumicut_light l{};
     double scale = p.number("scale", 1);
+    for (const PbrtParameter& q : p.list)
+      if ((q.name == "power" || q.name == "illuminance") && q.numbers.size() == 1 && !(q.numbers[0] > 0) &&
+          q.numbers[0] != -1)  // pbrt's "not given"
+        build_.scene.warnings.add("values out of range", *q.file, q.line,
+                                  fmt::format("{}: {} is {:g}, which counts for nothing", name, q.name, q.numbers[0]));
     const Vec from = p.vector("from", {0, 0, 0}), to = p.vector("to", {0, 0, 1});
     if (kind == "point" || kind == "spot") {
       Vec intensity = colour(p.find("I"), {1, 1, 1}, Use::light);
@@ -731,14 +806,19 @@ class Reader {
     const Vec intensity = colour(p.find("I"), {1, 1, 1}, Use::light);
     const double power = p.number("power", -1);
     const std::string file = p.word("filename", "");
-    const int32_t number = file.empty() ? 0 : build_.image(file, TextureUse::radiance, 0);
-    if (number == 0) return build_.leave_out("goniometric lights without a picture");
+    if (file.empty()) return build_.leave_out("goniometric lights without a picture");
+    const int32_t number = build_.image(file, TextureUse::radiance, 0, "the light is left out");
+    if (number == 0) return;
     const Texture& picture = build_.scene.textures.at(static_cast<size_t>(number) - 1);
     if (picture.width != picture.height)
       tokens_.fail(fmt::format("{} has a picture of {} by {} texels", name, picture.width, picture.height));
     double mean = 0;
-    for (const float x : picture.floats) mean += x;
+    for (const float x : picture.floats) {
+      if (!(x <= 1e15f)) tokens_.fail(fmt::format("{}: {} has a texel of {:g}; at most 1e15", name, shown(file), x));
+      mean += x;
+    }
     mean /= double(picture.floats.size());
+    if (mean == 0) return build_.leave_out("goniometric lights whose picture is black");
     if (power > 0 && mean > 0) scale *= power / (4 * kPi * mean);
     const Vec x = unit(state_.ctm.column(0)), y = unit(state_.ctm.column(2)), z = unit(state_.ctm.column(1));
     const double turn = dot(cross(x, z), y) < 0 ? -1 : 1;
@@ -757,12 +837,13 @@ class Reader {
       }
     }
     check_value(intensity, scale, name);
+    check_value(intensity * scale, 1, name);
     build_.add_profile_light(state_.ctm.column(3), z, x, intensity * scale, std::move(profile), name);
   }
   void check_value(const Vec& rgb, double scale, const std::string& name) {
     for (const double c : rgb)
-      if (!(c >= 0 && c <= 1e15)) tokens_.fail(fmt::format("{} has a colour of {}", name, c));
-    if (!(scale >= 0 && scale < 1e20)) tokens_.fail(fmt::format("{} has a scale of {}", name, scale));
+      if (!(c >= 0 && c <= 1e15)) tokens_.fail(fmt::format("{} has a colour of {:g}", name, c));
+    if (!(scale >= 0 && scale < 1e20)) tokens_.fail(fmt::format("{} has a scale of {:g}", name, scale));
   }
   void set_value(lumicut_light& l, const Vec& rgb, double scale, const std::string& name) {
     check_value(rgb, scale, name);
@@ -782,13 +863,14 @@ class Reader {
       rgb = colour(p.find("L"), {1, 1, 1}, Use::light);
       if (lux > 0) scale *= lux / kPi;
     } else {
-      const int32_t square = build_.image(file, TextureUse::radiance, 0);
+      const int32_t square = build_.image(file, TextureUse::radiance, 0, "white stands in");
       if (square != 0) e.texture = unrolled(square);
       if (const double now = e.texture != 0 ? illuminance_of(e.texture) : 0; lux > 0 && now > 0) scale *= lux / now;
     }
     if (p.find("portal") != nullptr) build_.approximate("infinite lights shine from all around, whatever their portal");
     if (!(scale >= 0 && scale < 1e15)) tokens_.fail(fmt::format("{} has a scale of {}", name, scale));
-    for (size_t k = 0; k < 3; ++k) e.color[k] = static_cast<float>(std::clamp(rgb[k], 0.0, 1e15) * scale);
+    check_value(rgb, scale, name);
+    for (size_t k = 0; k < 3; ++k) e.color[k] = static_cast<float>(rgb[k] * scale);
     // Axes of the light in the world, z up; what mirrors is taken into the map.
     const Vec x = unit(state_.ctm.column(0)), y = unit(state_.ctm.column(1)), z = unit(state_.ctm.column(2));
     const bool mirrored = state_.ctm.determinant() < 0;
@@ -1112,7 +1194,7 @@ class Reader {
 
   uint32_t with_alpha(uint32_t material, const Parameters& p) {
     lumicut_material m = build_.scene.materials[material].values;
-    const PaintRef alpha = paint(p, "alpha", 1, true);
+    const PaintRef alpha = build_.cut(paint(p, "alpha", 1, true), 0, 1, at("Shape", "alpha"));
     if (const auto value = constant_of(alpha)) {
       if ((*value)[0] >= 1) return material;
       m.opacity = std::max(kHole, static_cast<float>((*value)[0]));
@@ -1127,7 +1209,7 @@ class Reader {
     const bool both = p.truth("twosided", false);
     int32_t picture = 0;
     if (const std::string file = p.word("filename", ""); !file.empty()) {
-      picture = build_.image(file, TextureUse::colour, 0);
+      picture = build_.image(file, TextureUse::colour, 0, "the light is even");
       radiance = {1, 1, 1};
     }
     if (const double power = p.number("power", -1); power > 0) {
@@ -1144,7 +1226,8 @@ class Reader {
       if (picture != 0) area *= luminance(build_.mean_of(build_.image_paint(picture)));
       if (area > 0) scale *= power / (area * kPi * (both ? 2 : 1));
     }
-    if (!(scale >= 0 && scale < 1e15)) tokens_.fail(fmt::format("an area light has a scale of {}", scale));
+    check_value(radiance, scale, "the area light");
+    check_value(radiance * scale, 1, "the area light, times its scale and power,");
     tell_unread("area lights", p);
     return build_.with_emission(material, radiance * scale, picture, both);
   }
@@ -1152,7 +1235,7 @@ class Reader {
   PbrtTokens tokens_;
   SceneBuilder build_;
   State state_;
-  std::vector<State> stack_;
+  std::vector<Opened> stack_;
   std::map<std::string, Affine> systems_;
   std::map<std::pair<std::string, bool>, PaintRef> textures_;   // by name, and whether of numbers
   std::map<std::string, std::pair<uint32_t, bool>> materials_;  // and whether it is the border of a medium

@@ -290,7 +290,9 @@ class Mitsuba(SceneFiles):
             np.testing.assert_allclose(middles[~first][[0, -1]], [(0, 1, 2 * z) for z in ends[1]], atol=1e-5)
             np.testing.assert_allclose(radii[first], 0.1, rtol=1e-5)
             np.testing.assert_allclose(radii[~first], 0.2, rtol=1e-5)
-        for text, said in (("1 2 3\n", "line 1"), ("", "no points"), ("0 0 0 1\n1 0 0 1\n", "2 points"), ("0 0 0 1\n0 0 0 -1", "line 2")):
+        for text, said in (("1 2 3\n", "line 1"), ("", "no points"), ("0 0 0 1\n1 0 0 1\n", "line 3: a curve of 2 points"), ("0 0 0 1\n0 0 0 -1", "line 2"),
+                           ("0 0 0 1\nx", "line 2"), ("0 0 0 1\n\n\n1 1 1 1", "line 2: a curve of 1 points"), ("0 0 0 1\n0 1 0 1e39", "line 2: has a radius of 1e+39"),
+                           ("0 0 0 1\n0 1e18 0 1", "line 2: has a coordinate of 1e+18")):
             self.write("curves.txt", text)
             path = self.write("curves.xml", scene('<shape type="bsplinecurve"><string name="filename" value="curves.txt"/></shape>'))
             self.assert_ends(lumicut("render", path, "-o", self.folder / "x.exr"), BAD_FILE, "curves.txt", said)
@@ -339,15 +341,39 @@ class Mitsuba(SceneFiles):
                      "wide of sphere: left out", "odd of roughplastic: left out"):
             self.assertIn(text, said)
 
+    def test_values_of_materials_out_of_range_are_cut_and_told(self):
+        for bsdf, said in (('<bsdf type="diffuse"><rgb name="reflectance" value="3, .5, .5"/></bsdf>', 'line 5: reflectance of <bsdf type="diffuse"> is 3, not 0 to 1; 1 is taken'),
+                           ('<bsdf type="diffuse"><rgb name="reflectance" value="-3, .5, .5"/></bsdf>', "is -3, not 0 to 1; 0 is taken"),
+                           ('<bsdf type="plastic"><float name="int_ior" value="90"/></bsdf>', "int_ior over ext_ior"), ('<bsdf type="roughconductor"><float name="alpha" value="2"/></bsdf>', "alpha"),
+                           ('<bsdf type="principled"><float name="metallic" value="2"/></bsdf>', "metallic"), ('<bsdf type="principled"><float name="clearcoat" value="9"/></bsdf>', "clearcoat"),
+                           ('<bsdf type="hair"><float name="eumelanin" value="-3"/></bsdf>', "eumelanin"), ('<bsdf type="mask"><float name="opacity" value="2"/><bsdf type="diffuse"/></bsdf>', "opacity")):
+            with self.subTest(bsdf):
+                self.assertIn(said, self.render(self.floor('<emitter type="constant"/>\n<shape type="sphere">' + bsdf + "</shape>"), "--vpls", 10)[1])
+
+    def test_curves_without_length_or_width_are_left_out(self):
+        for text in ("0 0 0 0\n0 1 0 0\n\n0 0 0 1\n1 0 0 1", "0 0 0 1\n0 0 0 1\n\n0 0 0 1\n1 0 0 1"):
+            self.write("curves.txt", text)
+            path = self.write("curves.xml", scene('<shape type="linearcurve"><string name="filename" value="curves.txt"/></shape>'))
+            done = lumicut("check", "--no-forecast", "--json", path)
+            self.assertEqual(json.loads(done.stdout)["counts"]["triangles"], 24)
+            self.assertIn("curves without length or width: left out", done.stdout)
+
     def test_wrong_files_are_refused_by_name(self):
         os.mkfifo(self.folder / "pipe.xml")
         self.write("loop.xml", scene('<include filename="loop.xml"/>'))
         deep = '<bsdf type="twosided">' * 100 + '<bsdf type="diffuse"/>' + "</bsdf>" * 100
-        for part, texts in (("<shape", ("bad.xml", "byte")), ('<shape type="sphere"><float name="radius" value="x"/></shape>', ("<float", "x")),
-                            ('<shape type="sphere"><ref id="none"/></shape>', ("none", "no such id")), ('<include filename="loop.xml"/>', ("loop.xml", "without end")),
+        for part, texts in (("<shape", ("bad.xml", "line 4")), ('<shape type="sphere"><float name="radius" value="x"/></shape>', ("<float", "x")),
+                            ('<shape type="sphere"><ref id="none"/></shape>', ("none", "no such id")), ('<include filename="loop.xml"/>', ("loop.xml: line 2", "loop.xml includes itself")),
                             ('<include filename="pipe.xml"/>', ("pipe.xml",)), ('<shape type="obj"><string name="filename" value="no.obj"/></shape>', ("no.obj",)),
                             (f'<shape type="sphere">{deep}</shape>', ("without end",)), (camera((0, 0, 0), (0, 0, 0)), ("lookat", "own place")),
-                            ('<shape type="sphere"><float name="radius" value="$no"/></shape>', ("$no",)), (camera((0, 0, 1), (0, 0, 0), 400), ("fov", "400"))):
+                            ('<shape type="sphere"><float name="radius" value="$no"/></shape>', ("$no",)), (camera((0, 0, 1), (0, 0, 0), 400), ("fov", "400")),
+                            ('\n<shape type="obj"><string name="filename" value="a"/><string name="filename" value="b"/></shape>', ("line 4", "filename", "given twice")),
+                            ('<shape type="obj"/>', ("line 3", "name of the mesh is empty")), ('<shape type="ply"><string name="filename" value="."/></shape>', ("is a folder",)),
+                            ('<path/>', ("line 3", "<path>", "names no folder")), ('<path value="none"/>', ("none is no folder",)), ('<path value="loop.xml"/>', ("loop.xml is no folder",)),
+                            ('<shape type="sphere" id="a"/><shape type="cube" id="a"/>', ("line 3", 'id="a"', "of that id")),
+                            ('<shape type="sphere"><boolean name="flip_normals" value="yes"/></shape>', ("yes", "true or false")),
+                            ('<shape type="sphere"><float name="radius"/></shape>', ("radius", "no value")),
+                            ('<shape type="sphere"><emitter type="area"><rgb name="radiance" value="-1"/></emitter></shape>', ("radiance", "-1"))):
             with self.subTest(part[:60]):
                 self.assert_ends(lumicut("render", self.write("bad.xml", scene(FLOOR, part)), "-o", self.folder / "x.exr"), BAD_FILE, *texts)
         self.assert_ends(lumicut("render", self.write("odd.xml", "<html/>"), "-o", self.folder / "x.exr"), BAD_FILE, "odd.xml", "<scene>")

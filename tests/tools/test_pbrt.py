@@ -509,19 +509,64 @@ class Pbrt(SceneFiles):
                      '"wide" of shapes of the kind sphere: left out'):
             self.assertIn(text, said)
 
+    def test_values_of_materials_out_of_range_are_cut_and_told(self):
+        hair = 'Material "hair" {}'
+        for words, said in (('Material "diffuse" "rgb reflectance" [ .5 5 .5 ]', 'line 6: material "diffuse": reflectance is 5, not 0 to 1; 1 is taken'),
+                            ('Material "diffuse" "rgb reflectance" [ .5 -5 .5 ]', "reflectance is -5, not 0 to 1; 0 is taken"),
+                            ('MakeNamedMaterial "red" "string type" "coateddiffuse" "float roughness" 3', 'material "red": roughness is 3'),
+                            ('Material "dielectric" "float eta" 0', "eta is 0"), ('Material "conductor" "rgb k" [ -1 1 1 ]', "k is -1"),
+                            ('Material "diffusetransmission" "float scale" 9', "scale times reflectance is 2.25"),
+                            ('Texture "t" "spectrum" "scale" "float scale" -2 "texture tex" "u" Material "diffuse" "texture reflectance" "t"', "a factor of a texture is -2"),
+                            (hair.format('"float eumelanin" -1'), "eumelanin is -1"), (hair.format('"rgb sigma_a" [ 1 1 -1 ]'), "sigma_a is -1"),
+                            (hair.format('"float beta_n" 9'), "beta_n is 9"), (hair.format('"rgb reflectance" [ 2 2 2 ]'), "reflectance is 2"),
+                            ('LightSource "distant" "float illuminance" -3', "illuminance is -3, which counts for nothing"),
+                            ('Shape "sphere" "float alpha" 3', "alpha is 3"), ('LightSource "distant" "rgb L" [ 1 1 1 ] "float scale" 1 "float scale" 2', "is given twice")):
+            with self.subTest(words):
+                _, said_here = self.render(self.floor('Texture "u" "spectrum" "checkerboard"\n' + words, ""), "--vpls", 10)
+                self.assertIn(said, said_here)
+        many = self.floor("\n".join('Material "diffuse" "float reflectance" 2' for _ in range(30)), "")
+        said = self.render(many, "--vpls", 10)[1]
+        self.assertEqual(said.count("reflectance is 2"), 10)
+        self.assertIn("20 more values out of range", said)
+
+    def test_a_light_without_its_picture_is_left_out(self):
+        (self.folder / "d.exr").mkdir()
+        self.write_exr("black.exr", np.zeros((8, 8, 3), np.float32))
+        for name, said in (("no.exr", "no.exr does not exist; the light is left out"), ("d.exr", "d.exr is a folder; the light is left out"), ("black.exr", "picture is black: left out")):
+            _, said_here = self.render(self.floor(f'LightSource "goniometric" "string filename" "{name}"'), "--vpls", 10)
+            self.assertIn(said, said_here)
+            self.assertNotIn("grey", said_here)
+
     def test_wrong_files_are_refused_with_file_and_line(self):
         good = self.floor("LightSource \"point\"").read_text()
         self.write("loop.pbrt", 'Include "loop.pbrt"')
         for k in range(30):
             self.write(f"twice{k}.pbrt", f'Include "twice{k + 1}.pbrt" Include "twice{k + 1}.pbrt"')
         self.write("twice30.pbrt", "")
+        self.write("short.pbrt", "# nothing\n\n\n")
+        self.write("open.pbrt", "\nTranslate 1 x")
+        (self.folder / "folder.pbrt").mkdir()
+        self.write_exr("bright.exr", np.full((8, 8, 3), 1e38, np.float32))
         os.mkfifo(self.folder / "pipe.pbrt")
         for change, texts in ((("WorldBegin", "WorldBegn"), ("line 4", "WorldBegn")), (("0 1 2 0 2 3", "0 1 2 0 2 9"), ("9", "4 vertices")),
                               (("fov\" 1", "fov\" x"), ("line 3", "\"x\"")), (("LookAt 0 4 0.001", "LookAt 0 0 0"), ("its own place",)),
-                              (("WorldBegin", 'WorldBegin Include "loop.pbrt"'), ("loop.pbrt", "without end")),
+                              (("WorldBegin", 'WorldBegin Include "loop.pbrt"'), ("loop.pbrt: line 1", "loop.pbrt includes itself")),
                               (("WorldBegin", 'WorldBegin Include "twice0.pbrt"'), ("without end",)),
                               (("WorldBegin", 'WorldBegin Include "pipe.pbrt"'), ("pipe.pbrt",)), (("WorldBegin", 'WorldBegin Include "none.pbrt"'), ("none.pbrt",)),
-                              (("WorldBegin", "WorldBegin AttributeEnd"), ("AttributeEnd",)), (("WorldBegin", "WorldBegin AttributeBegin"), ("no end",)),
+                              (("WorldBegin", "WorldBegin AttributeEnd"), ("AttributeEnd",)), (("WorldBegin", "WorldBegin AttributeBegin"), ("AttributeBegin of line 4", "no end")),
+                              (("WorldBegin", 'WorldBegin ObjectBegin "a"'), ("ObjectBegin of line 4", "no end")),
+                              (("WorldBegin", 'WorldBegin ObjectBegin "a" AttributeBegin ObjectEnd'), ("ObjectEnd where the AttributeBegin of line 4",)),
+                              (("WorldBegin", 'WorldBegin Include ""'), ("line 4", "name of the file is empty")),
+                              (("WorldBegin", 'WorldBegin Include "folder.pbrt"'), ("line 4", "folder.pbrt is a folder")),
+                              (("WorldBegin", 'WorldBegin Include "short.pbrt"\nWorldBegn'), ("bad.pbrt: line 5", "WorldBegn")),
+                              (("WorldBegin", 'WorldBegin Include "open.pbrt"'), ("open.pbrt: line 2", "finite number")),
+                              (("WorldBegin", 'WorldBegin LightSource "infinite" "rgb L" [ -1 0 0 ]'), ("line 4", "colour of -1")),
+                              (("WorldBegin", 'WorldBegin AttributeBegin AreaLightSource "diffuse" "rgb L" [ -1 0 0 ] Shape "sphere" AttributeEnd'), ("line 4", "colour of -1")),
+                              (("WorldBegin", 'WorldBegin LightSource "goniometric" "string filename" "bright.exr"'), ("line 4", "bright.exr", "1e+38")),
+                              *((("WorldBegin", f'WorldBegin Shape "curve" "point3 P" [ 0 0 0 1 1 1 2 2 2 3 3 3 ] {words}'), ("line 4", said)) for words, said in (
+                                  ('"string width" "a"', "not a number"), ('"float width" [ 1 2 ]', "2 numbers instead of one"), ('"float type" 3', "not a text"),
+                                  ('"integer degree" 2.5', "no whole number"), ('"point3 N" "a"', "no number"), ('"string N" 1', "no text in quotes"),
+                                  ('"vector N" [ 1 2 ]', "multiple of 3"), ('"length width" 1', "of no type"))),
                               (("WorldBegin", 'WorldBegin ObjectInstance "a"'), ('"a"',)), (("\"float fov\" 1", "\"float fov\" ["), ("line 4", "WorldBegin", "finite number")),
                               (("WorldBegin", 'WorldBegin Shape "plymesh" "string filename" "no.ply"'), ("no.ply",)),
                               (("WorldBegin", 'WorldBegin Shape "curve" "point3 P" [ 0 0 0 1 1 1 ]'), ("line 4", "6 numbers in P")),
