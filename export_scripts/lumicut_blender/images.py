@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Texels of Blender's images: packed, generated and on disk, UDIM tiles and the frames of sequences."""
+import os
 import re
+import tempfile
 
 import bpy
 import numpy as np
@@ -164,6 +166,10 @@ class Images:
         space = described.colorspace_settings.name
         srgb = space not in LINEAR_SPACES
         if srgb and space != "sRGB":
+            colours = scene_linear(texels[..., :3], space)
+            if colours is not None:
+                alpha = texels[..., 3:]
+                return np.concatenate([colours if described.alpha_mode != "STRAIGHT" else colours * alpha, alpha], 2), False
             self.report.note(f"{described.name} ({space})", "Colour spaces of images taken as sRGB")
         return self._bytes(texels), srgb
 
@@ -218,6 +224,26 @@ class Images:
             top, left = (rows - 1 - number // 10) * height, number % 10 * width
             whole[top:top + height, left:left + width] = texels[y][:, x]
         return whole, not as_float and next(iter(found.values()))[1]
+
+
+def scene_linear(colours, space):
+    """(h, w, 3) of stored colours, by what Blender makes of a file of floats in that space; None where it cannot."""
+    height, width = colours.shape[:2]
+    texels = np.ones((height, width, 4), np.float32)
+    texels[..., :3] = colours
+    with tempfile.TemporaryDirectory() as folder, bpy.data.temp_data() as data:
+        try:
+            made = data.images.new("stored", width, height, alpha=True, float_buffer=True)
+            made.colorspace_settings.name, made.file_format = "Non-Color", "OPEN_EXR"
+            made.pixels.foreach_set(texels.ravel())
+            made.filepath_raw = os.path.join(folder, "stored.exr")
+            made.save()
+            read = data.images.load(made.filepath_raw)
+            read.colorspace_settings.name = space
+            read.pixels.foreach_get(texels.reshape(-1))
+        except (RuntimeError, TypeError):
+            return None
+    return texels[..., :3]
 
 
 def path_of(image):

@@ -10,7 +10,7 @@ import math
 import bpy
 import numpy as np
 
-from . import compat, volumes
+from . import compat, view_albedos, volumes
 from .lumicut import library
 from .images import Images, Picture, image_of
 from .mappings import Mapping, aligned
@@ -19,6 +19,7 @@ from .programs import NORMAL, CannotCompile, Compiler, ProgramPicture, of_pictur
 
 HOLE = 1e-3  # an opacity that the library takes as "not there"; 0 means 1 to it
 LARGEST_FACTOR = 1e6  # of a texture, in the library
+BY_VIEW_ALONE = "by the angle of view alone, and even over directions of light"
 MIRROR = 0.1  # roughness below which the library follows a reflection instead of shading it
 
 
@@ -137,6 +138,11 @@ def only_gloss(surface):
     return luminance(surface.gloss) + luminance(surface.metal) > 0 and all(luminance(getattr(surface, slot)) <= 0 for slot in others)
 
 
+def only_shines(surface):
+    return luminance(surface.emission) > 0 and surface.opacity.picture is None and (surface.opacity.factor == 1).all() and \
+        all(luminance(getattr(surface, slot)) <= 0 for slot in REFLECTED)
+
+
 def index_like(share):
     """Index of refraction whose reflectance, of light from all sides, is that of a picture by view, seen from the front."""
     seen = share.factor.mean() * share.picture.linear()[0, share.picture.linear().shape[1] // 2:].mean(-1)
@@ -248,6 +254,9 @@ class SurfaceReader(Evaluator):
 
     def closure_add_shader(self, node, stack):
         a, b = self.surface(node.inputs[0], stack), self.surface(node.inputs[1], stack)
+        if a.clear and only_shines(b) or b.clear and only_shines(a):  # a flame, a ghost: light passes whole, and more comes
+            passing, shining = (a, b) if a.clear else (b, a)
+            return dataclasses.replace(filtering(passing, self), emission=shining.emission)
         for surface in (a, b):
             if surface.clear:
                 self.taken_as_clear(surface)
@@ -408,7 +417,39 @@ class SurfaceReader(Evaluator):
         return Surface(diffuse=self.value(input_of(node, "Color"), stack))
 
     closure_subsurface_scattering = as_diffuse
-    closure_bsdf_velvet = closure_bsdf_sheen = closure_bsdf_toon = closure_bsdf_hair = closure_bsdf_hair_principled = as_diffuse
+    closure_bsdf_toon = closure_bsdf_hair = closure_bsdf_hair_principled = as_diffuse
+
+    def closure_bsdf_velvet(self, node, stack):
+        self.bumps(node, stack)
+        self.note(node.bl_label, f"Sheen {BY_VIEW_ALONE}")
+        sigma = max(0.01, self.number(input_of(node, "Sigma", "Roughness"), stack, "roughness"))
+        if getattr(node, "distribution", "ASHIKHMIN") == "ASHIKHMIN":
+            share = self.by_view(("velvet", sigma), lambda c, behind: view_albedos.velvet(c, sigma))
+        else:
+            share = self.microfibers(sigma)
+        return Surface(diffuse=self.multiply(self.value(input_of(node, "Color"), stack), share))
+
+    closure_bsdf_sheen = closure_bsdf_velvet
+
+    def microfibers(self, roughness):
+        roughness = min(1.0, roughness)
+        return self.by_view(("microfibers", roughness), lambda c, behind: view_albedos.microfibers(c, roughness))
+
+    def sheen(self, node, stack, base):
+        """(what it adds to the diffuse part, factor of what lies beneath) of a Principled BSDF."""
+        weight = self.clipped(self.grey(self.value(input_of(node, "Sheen", "Sheen Weight"), stack)))
+        if weight.is_zero():
+            return None, ONE
+        self.note("sheen", f"Sheen {BY_VIEW_ALONE}")
+        tint = node.inputs["Sheen Tint"]
+        if tint.type == "RGBA":  # since 4.0: above all else
+            colour = self.multiply(self.value(tint, stack), weight)
+            share = self.microfibers(self.number(node.inputs["Sheen Roughness"], stack, "sheen roughness"))
+            return self.multiply(colour, share), self.complement(self.multiply(Value(min(1.0, float(colour.mean().max()))), share))
+        towards, mean = min(1.0, max(0.0, self.number(tint, stack, "sheen tint"))), base.mean()
+        hue = mean / luminance(base) if luminance(base) > 0 else np.ones(3)
+        share = self.by_view(("sheen",), lambda c, behind: view_albedos.schlick_sheen(c))
+        return self.multiply(self.multiply(weight, Value(1 + towards * (hue - 1))), share), ONE
 
     def closure_eevee_specular(self, node, stack):
         return Surface(diffuse=self.value(node.inputs["Base Color"], stack),
@@ -447,7 +488,7 @@ class SurfaceReader(Evaluator):
             socket = input_of(node, *names)
             return self.value(socket, stack) if socket is not None else ZERO
 
-        for names, text in ((("Sheen", "Sheen Weight"), "sheen"), (("Anisotropic",), "anisotropy"), (("Thin Film Thickness",), "thin film")):
+        for names, text in ((("Anisotropic",), "anisotropy"), (("Thin Film Thickness",), "thin film")):
             socket = input_of(node, *names)
             if socket is None:
                 continue
@@ -481,6 +522,7 @@ class SurfaceReader(Evaluator):
         opaque = self.multiply(dielectric, self.complement(transmission))
         gloss = self.rough(node, stack)
         clearcoat, beneath = self.clear_coat(node, stack)
+        sheen, left = self.sheen(node, stack, base)
         base, f0 = self.multiply(beneath, base), self.multiply(beneath, f0)
         # Before 4.0 each border coloured by the base, since then by its root. A diffuse share needs the base itself.
         pure = transmission.picture is None and (transmission.factor >= 0.99).all()
@@ -497,7 +539,13 @@ class SurfaceReader(Evaluator):
         by_place = None
         if metallic.picture is not None:
             by_place = ByPlace(metallic, base if metal is base else self.mix(metallic, base, metal), f0)
-        return Surface(diffuse=self.multiply(base, opaque), metal=self.multiply(metal, metallic), glass=glass,
+        diffuse = self.multiply(base, opaque)
+        if sheen is not None:
+            diffuse = self.add(self.multiply(diffuse, left), sheen if left is not ONE else self.multiply(sheen, opaque))
+            if left is not ONE:  # gloss in the mean, which may be a picture's by now
+                rest = Value(left.mean())
+                f0, metal, glass = self.multiply(f0, rest), self.multiply(metal, rest), self.multiply(glass, rest)
+        return Surface(diffuse=diffuse, metal=self.multiply(metal, metallic), glass=glass,
                        coat=self.multiply(f0, opaque), ior=ior, emission=emission, opacity=opacity, by_place=by_place,
                        clearcoat=clearcoat, burley=bpy.app.version < (4, 0, 0), tint=tint, **gloss)
 
@@ -513,7 +561,8 @@ class Converted:
     source: tuple = (None, 0)  # name and pass index in Blender
 
     def plain_pictures(self):
-        return {slot: p for slot, p in self.pictures.items() if not isinstance(p, ProgramPicture)}
+        """Those that want coordinates on a mesh."""
+        return {slot: p for slot, p in self.pictures.items() if not isinstance(p, ProgramPicture) and not p.is_by_view()}
 
     def attributes(self):
         """What its programs ask of meshes, each once."""

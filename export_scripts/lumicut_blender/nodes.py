@@ -458,6 +458,8 @@ class Evaluator:
         if not self.all_rays:
             self.note("Light Path", "Nodes that depend on the ray, taken as for the camera's")
         elif output.name not in PATH_OUTPUTS:
+            if output.name == "Ray Length" and self.ray == "camera":
+                self.plain_or_program()  # which knows how far away the camera is
             self.note(f"Light Path: {output.name}", "Numbers of a ray's path taken as 0")
         return Value(1.0 if output.name in LIGHT_PATH[self.ray] else 0.0)
 

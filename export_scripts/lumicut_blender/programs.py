@@ -441,6 +441,9 @@ class Compiler:
         return Expr("camera", modes[output.name], mean=1)
 
     def _light_path(self, node, output, stack):
+        if output.name == "Ray Length" and self.reader.ray == "camera":
+            self.reader.by_ray = True
+            return Expr("camera", 3, mean=1)
         return const(self.reader._light_path(node, output, stack).factor)
 
     def _value(self, node, output, stack):

@@ -57,6 +57,15 @@ class Images(unittest.TestCase):
         np.testing.assert_allclose(means[0], means[1], rtol=tolerance, atol=0.002)
         return means[0]
 
+    def test_stored_colours_of_any_colour_space(self):
+        names = ("Filmic sRGB", "Linear ACES", "XYZ") if h.VERSION < (4, 0, 0) else ("Filmic sRGB", "ACES2065-1", "Linear Rec.2020")
+        for space in names:
+            with self.subTest(space=space):
+                self.board(self.textured(image_of(space, halves((0.6, 0.4, 0.2), (0.3, 0.5, 0.4)), space))[0])
+                self.compare()
+                self.assertEqual(h.last_notes(), [])
+                bpy.data.objects.remove(bpy.data.objects["Board"])
+
     def test_alpha_that_is_not_linked_darkens_as_stored(self):
         m, texture, _ = self.textured(image_of("a", halves((.8, .6, .4, .25), (.8, .6, .4, 1))))
         self.board(m)

@@ -74,6 +74,7 @@ def normal_mapped(m, node, image, strength):
 GOLD, RED, DARK = (0.9, 0.6, 0.3), (0.6, 0.15, 0.1), (0.02, 0.02, 0.02)
 SPECULAR = "Specular|Specular IOR Level"
 TRANSMISSION = "Transmission|Transmission Weight"
+SHEEN = "Sheen|Sheen Weight"
 COAT, COAT_ROUGHNESS = "Clearcoat|Coat Weight", "Clearcoat Roughness|Coat Roughness"
 
 
@@ -182,6 +183,49 @@ class Materials(unittest.TestCase):
             ours, theirs = h.both(16, 16, 0)
             np.testing.assert_allclose(ours["Combined"].mean((0, 1)), theirs["Combined"].mean((0, 1)), rtol=0.08)
             self.assertTrue(any("Bump Map Correction" in note for note in h.last_notes()))
+
+    def test_sheen_is_as_bright_as_in_cycles(self):
+        """To 3 % under an even sky, by its albedo; a lamp from the front, spread evenly: to 11 %."""
+        scene = bpy.context.scene
+        scene.render.resolution_x = scene.render.resolution_y = 32
+        scene.camera.data.type, scene.camera.data.ortho_scale, scene.camera.location = "ORTHO", 1.7, (0, 0, 5)
+        cloth = principled("Cloth", **{"Base Color": (0.2, 0.05, 0.05), SPECULAR: 0.0, "Roughness": 1.0, SHEEN: 1.0})[0]
+        velvet = h.material("Velvet")
+        velvet_type = "ShaderNodeBsdfVelvet" if bpy.app.version < (4, 0, 0) else "ShaderNodeBsdfSheen"
+        h.shader(velvet, velvet_type).inputs["Color"].default_value = (0.8, 0.3, 0.2, 1)
+        ball = h.add_sphere(1.0, segments=64)
+        lamp = h.add_light("SUN", energy=0, rotation=(0.5, 0, 0), angle=0.1)
+        for m in (cloth, velvet):
+            ball.data.materials.clear()
+            ball.data.materials.append(m)
+            for sky, sun, tolerance in ((0.5, 0, 0.03), (0, 3, 0.11)):
+                with self.subTest(material=m.name, sky=sky):
+                    h.set_world((sky, sky, sky))
+                    lamp.data.energy = sun
+                    ours, theirs = h.both(64, 64, 0)
+                    ratio = ours["Combined"][..., :3].mean((0, 1)) / theirs["Combined"][..., :3].mean((0, 1))
+                    self.assertLess(abs(ratio - 1).max(), tolerance, ratio)
+            self.assertEqual(len(h.last_notes()), 1)
+            self.assertIn("Sheen by the angle of view", h.last_notes()[0])
+
+    def test_light_passes_what_shines_and_hides_nothing(self):
+        """Transparent and Emission added: a flame before a wall, as Cycles has it."""
+        h.set_world((0.3, 0.3, 0.3))
+        h.add_plane(4, material=h.diffuse((0.8, 0.4, 0.2), "wall"))
+        m = h.material("flame")
+        tree = m.node_tree
+        both, clear, light = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("AddShader", "BsdfTransparent", "Emission"))
+        light.inputs["Color"].default_value, light.inputs["Strength"].default_value = (0.2, 0.5, 1, 1), 0.6
+        tree.links.new(clear.outputs[0], both.inputs[0])
+        tree.links.new(light.outputs[0], both.inputs[1])
+        tree.links.new(both.outputs[0], next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL").inputs["Surface"])
+        h.add_sphere(0.5, material=m, segments=32).location.z = 1
+        bpy.context.scene.camera.location = (0, 0, 5)
+        bpy.context.scene.camera.data.type, bpy.context.scene.camera.data.ortho_scale = "ORTHO", 2
+        ours, theirs = h.both(64, 64, 0)
+        a, b = (h.blocks(image["Combined"][..., :3], 8) for image in (ours, theirs))
+        np.testing.assert_allclose(a.mean((0, 1)), b.mean((0, 1)), rtol=0.02)
+        self.assertEqual(h.last_notes(), [])
 
     def panes(self, shader):
         """A floor half under a pane that `shader` makes of its tree, seen from above: Cycles' means of both halves and ours."""
