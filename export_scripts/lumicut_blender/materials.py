@@ -19,7 +19,7 @@ from .programs import NORMAL, CannotCompile, Compiler, ProgramPicture, of_pictur
 
 HOLE = 1e-3  # an opacity that the library takes as "not there"; 0 means 1 to it
 LARGEST_FACTOR = 1e6  # of a texture, in the library
-BY_VIEW_ALONE = "by the angle of view alone, and even over directions of light"
+SHEEN_BY_VIEW = "Sheen by the angle of view alone, and even over directions of light"
 MIRROR = 0.1  # roughness below which the library follows a reflection instead of shading it
 
 
@@ -421,7 +421,7 @@ class SurfaceReader(Evaluator):
 
     def closure_bsdf_velvet(self, node, stack):
         self.bumps(node, stack)
-        self.note(node.bl_label, f"Sheen {BY_VIEW_ALONE}")
+        self.note(node.bl_label, SHEEN_BY_VIEW)
         sigma = max(0.01, self.number(input_of(node, "Sigma", "Roughness"), stack, "roughness"))
         if getattr(node, "distribution", "ASHIKHMIN") == "ASHIKHMIN":
             share = self.by_view(("velvet", sigma), lambda c, behind: view_albedos.velvet(c, sigma))
@@ -440,7 +440,7 @@ class SurfaceReader(Evaluator):
         weight = self.clipped(self.grey(self.value(input_of(node, "Sheen", "Sheen Weight"), stack)))
         if weight.is_zero():
             return None, ONE
-        self.note("sheen", f"Sheen {BY_VIEW_ALONE}")
+        self.note("sheen", SHEEN_BY_VIEW)
         tint = node.inputs["Sheen Tint"]
         if tint.type == "RGBA":  # since 4.0: above all else
             colour = self.multiply(self.value(tint, stack), weight)
