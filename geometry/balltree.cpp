@@ -71,13 +71,14 @@ uint32_t BallTree::new_leaf(const double* c, double radius) {
     free_leaves_.pop_back();
     leaf_node_[id] = n;
   }
-  nodes_[n].leaf = id;
+  nodes_[n].leaf = nodes_[n].least = id;
   ++leaves_;
   return n;
 }
 
 void BallTree::fit(uint32_t n) {
   const uint32_t a = nodes_[n].left, b = nodes_[n].right;
+  nodes_[n].least = std::min(nodes_[a].least, nodes_[b].least);
   const double ra = nodes_[a].radius, rb = nodes_[b].radius;
   const double *ca = centre(a), *cb = centre(b);
   double* c = centre(n);
@@ -116,7 +117,7 @@ void BallTree::refit_upwards(uint32_t n) {
 }
 
 BallTree BallTree::build(std::span<const double> centres, std::span<const double> radii, int dimension,
-                         BallTreeBuilder builder) {
+                         BallTreeBuilder builder, Progress* progress) {
   BallTree t(dimension);
   const auto d = static_cast<size_t>(dimension);
   const size_t n = centres.size() / d;
@@ -129,6 +130,7 @@ BallTree BallTree::build(std::span<const double> centres, std::span<const double
   if (n == 0) return t;
   t.nodes_.reserve(2 * n);
   t.centres_.reserve(2 * n * d);
+  if (progress != nullptr) progress->begin("ball tree", n);
   std::vector<uint32_t> nodes(n);
   const bool online = builder == BallTreeBuilder::insertion || builder == BallTreeBuilder::cheap_insertion;
   for (size_t i = 0; i < n; ++i) {
@@ -137,9 +139,10 @@ BallTree BallTree::build(std::span<const double> centres, std::span<const double
       t.attach(nodes[i], t.root_ == kNone                        ? kNone
                          : builder == BallTreeBuilder::insertion ? t.best_sibling(nodes[i])
                                                                  : t.cheap_sibling(nodes[i]));
+    if (online && progress != nullptr) progress->advance(1), progress->check();
   }
   if (builder == BallTreeBuilder::kd) t.root_ = t.build_kd(nodes, 0, n);
-  if (builder == BallTreeBuilder::top_down) t.root_ = t.build_top_down(nodes);
+  if (builder == BallTreeBuilder::top_down) t.root_ = t.build_top_down(nodes, progress);
   if (builder == BallTreeBuilder::bottom_up) t.root_ = t.build_bottom_up(centres, radii);
   return t;
 }
@@ -163,23 +166,36 @@ uint32_t BallTree::build_kd(std::vector<uint32_t>& nodes, size_t begin, size_t e
   return join(left, right);
 }
 
-uint32_t BallTree::build_top_down(std::vector<uint32_t>& nodes) {
+uint32_t BallTree::build_top_down(const std::vector<uint32_t>& all, Progress* progress) {
   // Splits first, with placeholders; then inner balls from the bottom up.
   struct Range {
-    size_t begin, end;
+    size_t begin, end, by;  // in order of that dimension; dim_: as they came
     uint32_t parent;
     bool is_left;
   };
-  std::vector<Range> stack{{0, nodes.size(), kNone, false}};
-  std::vector<uint32_t> created, best_order;
-  std::vector<double> cost(nodes.size()), c(static_cast<size_t>(dim_));
+  const auto dimensions = static_cast<size_t>(dim_);
+  std::vector<Range> stack{{0, all.size(), dimensions, kNone, false}};
+  // Sorted once by each dimension, then parted in order; the last order is that in which they came.
+  const auto at = [](std::vector<uint32_t>& of, size_t i) { return of.begin() + static_cast<std::ptrdiff_t>(i); };
+  const auto sort = [&](std::vector<uint32_t>& of, size_t begin, size_t end, size_t j) {
+    std::sort(at(of, begin), at(of, end), [&](uint32_t a, uint32_t b) {
+      const double x = centre(a)[j], y = centre(b)[j];
+      return x < y || (x == y && a < b);
+    });
+  };
+  std::vector<std::vector<uint32_t>> order(dimensions + 1, all);
+  for (size_t j = 0; j < dimensions; ++j) sort(order[j], 0, all.size(), j);
+  std::vector<uint32_t> created, rest;
+  std::vector<uint8_t> left_of(nodes_.size(), 0);
+  std::vector<double> cost(all.size()), c(dimensions);
   uint32_t root = kNone;
   while (!stack.empty()) {
     const Range r = stack.back();
     stack.pop_back();
     uint32_t n;
     if (r.end - r.begin == 1) {
-      n = nodes[r.begin];
+      n = order[r.by][r.begin];
+      if (progress != nullptr) progress->advance(1), progress->check();
     } else {
       // A ball that grows over the range, from either end. [fill_in_cst]
       double radius = 0, scale = 0;
@@ -200,18 +216,13 @@ uint32_t BallTree::build_top_down(std::vector<uint32_t>& nodes) {
         std::copy(centre(leaf), centre(leaf) + dim_, c.begin());
         radius = nodes_[leaf].radius;
       };
-      start(nodes[r.begin]);
-      for (size_t i = r.begin; i < r.end; ++i) grow(nodes[i]);
+      start(order[r.by][r.begin]);
+      for (size_t i = r.begin; i < r.end; ++i) grow(order[r.by][i]);
       scale = radius > 0 ? 1 / radius : 0;  // costs relative to the whole range: r^d would underflow
       double best = std::numeric_limits<double>::infinity();
-      size_t split = r.begin + 1;
-      best_order.clear();
-      for (int j = 0; j < dim_; ++j) {
-        std::sort(nodes.begin() + static_cast<std::ptrdiff_t>(r.begin),
-                  nodes.begin() + static_cast<std::ptrdiff_t>(r.end), [&](uint32_t a, uint32_t b) {
-                    const double x = centre(a)[j], y = centre(b)[j];
-                    return x < y || (x == y && a < b);
-                  });
+      size_t split = r.begin + 1, by = 0;
+      for (size_t j = 0; j < dimensions; ++j) {
+        const std::vector<uint32_t>& nodes = order[j];
         start(nodes[r.begin]);
         for (size_t i = r.begin; i + 1 < r.end; ++i) grow(nodes[i]), cost[i] = volume(radius * scale);
         start(nodes[r.end - 1]);
@@ -223,15 +234,24 @@ uint32_t BallTree::build_top_down(std::vector<uint32_t>& nodes) {
           const double sum = cost[i - 1] + volume(radius * scale);
           if (sum < best || (better && sum == best && uneven(i) < uneven(split))) best = sum, split = i, better = true;
         }
-        if (better)
-          best_order.assign(nodes.begin() + static_cast<std::ptrdiff_t>(r.begin),
-                            nodes.begin() + static_cast<std::ptrdiff_t>(r.end));
+        if (better) by = j;
       }
-      std::copy(best_order.begin(), best_order.end(), nodes.begin() + static_cast<std::ptrdiff_t>(r.begin));
+      for (size_t i = r.begin; i < r.end; ++i) left_of[order[by][i]] = i < split;
+      for (size_t j = 0; j < dimensions; ++j) {
+        if (j == by) continue;
+        rest.clear();
+        auto to = at(order[j], r.begin);
+        for (size_t i = r.begin; i < r.end; ++i)
+          if (const uint32_t leaf = order[j][i]; left_of[leaf] != 0)
+            *to++ = leaf;
+          else
+            rest.push_back(leaf);
+        std::copy(rest.begin(), rest.end(), to);
+      }
       n = new_node();
       created.push_back(n);
-      stack.push_back({r.begin, split, n, true});
-      stack.push_back({split, r.end, n, false});
+      stack.push_back({r.begin, split, by, n, true});
+      stack.push_back({split, r.end, by, n, false});
     }
     nodes_[n].parent = r.parent;
     if (r.parent == kNone)
@@ -389,6 +409,14 @@ std::vector<uint32_t> BallTree::search(std::span<const double> c, double radius,
       stack.push_back(n.left), stack.push_back(n.right);
     }
   }
+  if (found.size() > leaf_node_.size() / 16) {  // many: marked in place of sorted
+    std::vector<uint8_t> marked(leaf_node_.size(), 0);
+    for (const uint32_t id : found) marked[id] = 1;
+    found.clear();
+    for (uint32_t id = 0; id < marked.size(); ++id)
+      if (marked[id] != 0) found.push_back(id);
+    return found;
+  }
   std::sort(found.begin(), found.end());
   return found;
 }
@@ -418,6 +446,8 @@ std::vector<uint32_t> BallTree::nearest(std::span<const double> p, size_t m, Dis
   };
   std::vector<Entry> stack;
   const auto near = [&](uint32_t n) { return distance(centre(n), p.data()) - nodes_[n].radius; };
+  // No leaf below is better than that: where many are equally near, ids decide.
+  const auto least_key = [&](const Entry& e) { return std::pair(e.near, nodes_[e.node].least); };
   if (root_ != kNone && m > 0) stack.push_back({near(root_), root_});
   while (!stack.empty()) {
     const Entry e = stack.back();
@@ -435,9 +465,9 @@ std::vector<uint32_t> BallTree::nearest(std::span<const double> p, size_t m, Dis
       if (heap.size() > m) std::pop_heap(heap.begin(), heap.end()), heap.pop_back();
       continue;
     }
-    if (heap.size() == m && e.near > heap.front().first) continue;
+    if (heap.size() == m && least_key(e) > heap.front()) continue;
     Entry a{near(n.left), n.left}, b{near(n.right), n.right};
-    if (a.near < b.near) std::swap(a, b);
+    if (least_key(a) < least_key(b)) std::swap(a, b);
     stack.push_back(a);
     stack.push_back(b);  // the nearer one first
   }
@@ -452,7 +482,7 @@ uint32_t BallTree::best_mate(std::span<const double> c, double radius, uint32_t 
   // No leaf in a node gives a smaller joint ball than the node's point nearest to the query would.
   const auto bound = [&](uint32_t n) {
     const double near = std::max(0.0, distance(centre(n), c.data()) - nodes_[n].radius);
-    return std::max(radius, 0.5 * (near + radius));
+    return std::pair(std::max(radius, 0.5 * (near + radius)), nodes_[n].least);
   };
   std::pair<double, uint32_t> best{std::numeric_limits<double>::infinity(), kNone};
   std::vector<uint32_t> stack;
@@ -465,7 +495,7 @@ uint32_t BallTree::best_mate(std::span<const double> c, double radius, uint32_t 
       if (n.leaf != except) best = std::min(best, {joint_radius(i, c.data(), radius), n.leaf});
       continue;
     }
-    if (bound(i) > best.first) continue;
+    if (bound(i) > best) continue;
     const bool left_last = bound(n.left) <= bound(n.right);
     stack.push_back(left_last ? n.right : n.left);
     stack.push_back(left_last ? n.left : n.right);

@@ -11,14 +11,20 @@
 #include <utility>
 #include <vector>
 
+#include "core/progress.h"
+
 namespace lumicut {
 
 enum class BallTreeBuilder {
-  kd,               // median of the widest dimension: balanced
-  top_down,         // the split, over all dimensions, of least joint volume
-  insertion,        // on-line, best sibling by branch and bound (not exact for balls: the paper says so)
-  cheap_insertion,  // on-line, into the child that expands less
-  bottom_up         // greedy pairs of least joint ball; dimension at most 16
+  kd,  // median of the widest dimension: balanced
+  // The split, over all dimensions, of least joint volume: points alone are often split off one by one, so that depth, and
+  // with it time, grow faster than their number.
+  top_down,
+  // On-line, best sibling by branch and bound (not exact for balls: the paper says so), or into the child that expands
+  // less. Balls that come in order along a line make a tree as deep as there are balls, in quadratic time.
+  insertion,
+  cheap_insertion,
+  bottom_up  // greedy pairs of least joint ball; dimension at most 16
 };
 
 class BallTree {
@@ -30,7 +36,7 @@ class BallTree {
   // `centres`: n rows of `dimension` numbers; `radii`: n numbers, or empty for points. Leaf i is ball i.
   // Throws invalid_argument on sizes that do not fit, values that are not finite or beyond 1e15, radii below 0.
   static BallTree build(std::span<const double> centres, std::span<const double> radii, int dimension,
-                        BallTreeBuilder builder);
+                        BallTreeBuilder builder, Progress* progress = nullptr);
 
   // On-line use. Returns the new leaf's id; ids of removed leaves are used again.
   uint32_t insert(std::span<const double> centre, double radius, bool cheap = false);
@@ -74,7 +80,8 @@ class BallTree {
   struct Node {
     double radius = 0;
     uint32_t left = kNone, right = kNone, parent = kNone;
-    uint32_t leaf = kNone;  // leaf id; kNone: inner
+    uint32_t leaf = kNone;   // leaf id; kNone: inner
+    uint32_t least = kNone;  // of the ids of its leaves
   };
   const double* centre(uint32_t node) const { return &centres_[static_cast<size_t>(node) * static_cast<size_t>(dim_)]; }
   double* centre(uint32_t node) { return &centres_[static_cast<size_t>(node) * static_cast<size_t>(dim_)]; }
@@ -94,7 +101,7 @@ class BallTree {
   uint32_t cheap_sibling(uint32_t leaf) const;
   void attach(uint32_t leaf, uint32_t sibling);
   uint32_t build_kd(std::vector<uint32_t>& nodes, size_t begin, size_t end);
-  uint32_t build_top_down(std::vector<uint32_t>& nodes);
+  uint32_t build_top_down(const std::vector<uint32_t>& nodes, Progress* progress);
   uint32_t build_bottom_up(std::span<const double> centres, std::span<const double> radii);
 
   int dim_;

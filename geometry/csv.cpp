@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <istream>
 
 #include "core/error.h"
@@ -10,9 +11,16 @@
 namespace lumicut {
 namespace {
 
+std::string short_text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
+
 // `fields`: names of the columns; none: as many as the first row of numbers has.
+// row(values, bad): bad(field, what) throws.
 template <typename Fn>
-void read_rows(std::istream& in, const std::string& name, std::vector<std::string> fields, Fn&& row) {
+void read_rows(std::istream& in, const std::string& name, std::vector<std::string> fields, double most, Fn&& row) {
   std::string line;
   std::vector<double> values(fields.size());
   for (size_t number = 1, rows = 0; std::getline(in, line); ++number) {
@@ -44,6 +52,7 @@ void read_rows(std::istream& in, const std::string& name, std::vector<std::strin
       if (r.ec == std::errc::result_out_of_range) bad(k, "is " + std::string(at, r.ptr) + ", out of range");
       if (r.ec != std::errc()) bad(k, "is missing or not a number");
       if (!std::isfinite(values[k])) bad(k, "is " + std::string(at, r.ptr) + ", not a finite number");
+      if (std::fabs(values[k]) > most) bad(k, "is " + std::string(at, r.ptr) + ", beyond " + short_text(most));
       at = r.ptr;
       skip();
       if (k + 1 < fields.size()) {
@@ -54,40 +63,62 @@ void read_rows(std::istream& in, const std::string& name, std::vector<std::strin
     if (at != end)
       fail_argument(name + ", line " + std::to_string(number) + ": more than " + std::to_string(fields.size()) +
                     " fields");
-    row(values);
+    row(values, bad);
   }
+}
+
+void check_not_negative(double value, size_t field, const auto& bad) {
+  if (value < 0) bad(field, "is " + short_text(value) + ", below 0");
 }
 
 }  // namespace
 
-std::vector<Point2> read_points_csv(std::istream& in, const std::string& name) {
+std::vector<Point2> read_points_csv(std::istream& in, const std::string& name, double most) {
   std::vector<Point2> points;
-  read_rows(in, name, {"x", "y"}, [&](const std::vector<double>& v) { points.push_back({v[0], v[1]}); });
+  read_rows(in, name, {"x", "y"}, most, [&](const std::vector<double>& v, const auto&) {
+    points.push_back({v[0], v[1]});
+  });
   return points;
 }
 
-std::vector<Disk> read_disks_csv(std::istream& in, const std::string& name) {
+std::vector<Disk> read_disks_csv(std::istream& in, const std::string& name, double most) {
   std::vector<Disk> disks;
-  read_rows(in, name, {"x", "y", "radius"}, [&](const std::vector<double>& v) {
+  read_rows(in, name, {"x", "y", "radius"}, most, [&](const std::vector<double>& v, const auto& bad) {
+    check_not_negative(v[2], 2, bad);
     disks.push_back({{v[0], v[1]}, v[2]});
   });
   return disks;
 }
 
-std::vector<double> read_numbers_csv(std::istream& in, const std::string& name, const std::string& field) {
-  std::vector<double> numbers;
-  read_rows(in, name, {field}, [&](const std::vector<double>& v) { numbers.push_back(v[0]); });
-  return numbers;
+std::vector<double> read_weights_csv(std::istream& in, const std::string& name, double most) {
+  std::vector<double> weights;
+  read_rows(in, name, {"weight"}, most, [&](const std::vector<double>& v, const auto& bad) {
+    check_not_negative(v[0], 0, bad);
+    weights.push_back(v[0]);
+  });
+  return weights;
 }
 
-std::vector<double> read_table_csv(std::istream& in, const std::string& name, size_t& columns) {
+std::vector<double> read_table_csv(std::istream& in, const std::string& name, size_t& columns, double most,
+                                   bool radii) {
   std::vector<double> table;
   columns = 0;
-  read_rows(in, name, {}, [&](const std::vector<double>& v) {
+  read_rows(in, name, {}, most, [&](const std::vector<double>& v, const auto& bad) {
     columns = v.size();
+    if (radii) check_not_negative(v.back(), columns - 1, bad);
     table.insert(table.end(), v.begin(), v.end());
   });
   return table;
+}
+
+std::vector<uint32_t> read_indices_csv(std::istream& in, const std::string& name, size_t below, const std::string& of) {
+  std::vector<uint32_t> indices;
+  read_rows(in, name, {}, kAnyNumber, [&](const std::vector<double>& v, const auto& bad) {
+    if (!(v[0] >= 0 && v[0] < static_cast<double>(below)) || v[0] != std::floor(v[0]))
+      bad(0, "is " + short_text(v[0]) + ", which is none of " + std::to_string(below) + " " + of);
+    indices.push_back(static_cast<uint32_t>(v[0]));
+  });
+  return indices;
 }
 
 std::vector<std::vector<uint32_t>> read_index_rows_csv(std::istream& in, const std::string& name, size_t below) {

@@ -14,12 +14,16 @@
 namespace lumicut {
 namespace {
 
+constexpr size_t kMostTouching = size_t{1} << 29;  // entries of lists, 4 bytes each
+
 // Sets of up to `exchange` - 1 chosen disks are enumerated along links: two are linked where a disk outside touches
 // both, and at most `exchange` - 1 chosen ones in all. As with hitting sets, an improvement that contains no smaller
 // one is connected by links: if its new disks fell into groups that touch different old ones, one group would do.
 class Search {
  public:
-  Search(std::span<const Disk> disks, int exchange) : exchange_(exchange), touching_(disks.size()) {
+  Search(std::span<const Disk> disks, int exchange, Progress* progress) : exchange_(exchange), touching_(disks.size()) {
+    size_t pairs = 0;
+    if (progress != nullptr) progress->begin("disks that touch", disks.size());
     std::vector<double> centres, radii;
     for (const Disk& d : disks) centres.push_back(d.centre.x), centres.push_back(d.centre.y), radii.push_back(d.radius);
     const BallTree tree = BallTree::build(centres, radii, 2, BallTreeBuilder::kd);
@@ -31,6 +35,13 @@ class Search {
         const double sum = d.radius + disks[j].radius;
         if (j != i && dist2(d.centre, disks[j].centre) <= sum * sum) touching_[i].push_back(j);
       }
+      pairs += touching_[i].size();
+      if (pairs > kMostTouching)
+        fail_argument("independent set: the first " + std::to_string(i + 1) + " of " + std::to_string(disks.size()) +
+                      " disks touch others " + std::to_string(pairs) + " times; lists of at most " +
+                      std::to_string(kMostTouching) + " are kept");
+      touching_[i].shrink_to_fit();
+      if (progress != nullptr) progress->advance(1), progress->check();
     }
     chosen_.assign(disks.size(), 0), taken_.assign(disks.size(), 0);
     queue_ = WorkQueue(disks.size());
@@ -43,12 +54,13 @@ class Search {
     for (const uint32_t e : touching_[d]) ++taken_[e];
   }
 
-  void run() {
+  void run(Progress* progress) {
     for (uint32_t d = 0; d < chosen_.size(); ++d)
       if (free(d)) choose(d);
     for (uint32_t d = 0; d < chosen_.size(); ++d)
       if (chosen_[d]) queue_.push(d);
     queue_.run([&](uint32_t x) {
+      if (progress != nullptr) progress->check();
       while (chosen_[x] && improve_around(x)) {
       }
     });
@@ -72,8 +84,12 @@ class Search {
     mark_[x] = mark;
     for (const uint32_t y : touching_[x]) {
       if (taken_[y] > most()) continue;
-      for (const uint32_t z : touching_[y])
-        if (chosen_[z] && mark_[z] != mark) mark_[z] = mark, out.push_back(z);
+      uint32_t left = taken_[y];
+      for (auto z = touching_[y].begin(); left > 0; ++z) {
+        if (!chosen_[*z]) continue;
+        --left;
+        if (mark_[*z] != mark) mark_[*z] = mark, out.push_back(*z);
+      }
     }
     std::sort(out.begin(), out.end());
     return out;
@@ -83,16 +99,15 @@ class Search {
   bool try_set(std::span<const uint32_t> x) {
     const uint32_t mark = ++stamp_;
     for (const uint32_t c : x) mark_[c] = mark;
-    std::vector<uint32_t> outside;
+    std::vector<uint32_t> outside, by_x;  // by_x: what x touches, as often as it does
     for (const uint32_t c : x)
-      for (const uint32_t y : touching_[c]) {
-        if (mark_[y] == mark || chosen_[y] || taken_[y] > x.size()) continue;
-        mark_[y] = mark;
-        uint32_t of_x = 0;
-        for (const uint32_t z : touching_[y]) of_x += chosen_[z] && std::find(x.begin(), x.end(), z) != x.end();
-        if (of_x == taken_[y]) outside.push_back(y);
-      }
-    std::sort(outside.begin(), outside.end());
+      for (const uint32_t y : touching_[c])
+        if (mark_[y] != mark && !chosen_[y] && taken_[y] <= x.size()) by_x.push_back(y);
+    if (x.size() > 1) std::sort(by_x.begin(), by_x.end());
+    for (size_t i = 0, next = 0; i < by_x.size(); i = next) {
+      while (next < by_x.size() && by_x[next] == by_x[i]) ++next;
+      if (next - i == taken_[by_x[i]]) outside.push_back(by_x[i]);
+    }
     std::vector<uint32_t> picked;
     if (!pick(outside, x.size() + 1, picked)) return false;
     for (const uint32_t c : x) {
@@ -127,8 +142,15 @@ class Search {
       if (count == 1) return true;
       std::vector<uint32_t> rest;
       const auto& near = touching_[from[i]];
-      for (size_t j = i + 1; j < from.size(); ++j)
-        if (!std::binary_search(near.begin(), near.end(), from[j])) rest.push_back(from[j]);
+      auto at = std::upper_bound(near.begin(), near.end(), from[i]);
+      const bool many = 8 * (from.size() - i) > near.size();
+      for (size_t j = i + 1; j < from.size(); ++j) {
+        if (many)
+          while (at != near.end() && *at < from[j]) ++at;
+        else
+          at = std::lower_bound(at, near.end(), from[j]);
+        if (at == near.end() || *at != from[j]) rest.push_back(from[j]);
+      }
       if (pick(rest, count - 1, picked)) return true;
       picked.pop_back();
     }
@@ -165,12 +187,13 @@ class Search {
 
 }  // namespace
 
-std::vector<uint32_t> independent_disks(std::span<const Disk> disks, int exchange, std::span<const uint32_t> start) {
+std::vector<uint32_t> independent_disks(std::span<const Disk> disks, int exchange, std::span<const uint32_t> start,
+                                        Progress* progress) {
   validate_hitting_instance({}, disks);
   if (exchange < 2 || exchange > 4)
     fail_argument("independent set: exchange " + std::to_string(exchange) + "; 2 to 4 expected");
   if (disks.empty()) return {};
-  Search search(disks, exchange);
+  Search search(disks, exchange, progress);
   if (!start.empty()) {
     for (const uint32_t d : start) {
       if (d >= disks.size())
@@ -187,7 +210,8 @@ std::vector<uint32_t> independent_disks(std::span<const Disk> disks, int exchang
     for (const uint32_t d : order)
       if (search.free(d)) search.choose(d);
   }
-  search.run();
+  if (progress != nullptr) progress->begin("local search", 0);
+  search.run(progress);
   return search.result();
 }
 

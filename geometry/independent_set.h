@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/progress.h"
 #include "geometry/point2.h"
 
 namespace lumicut {
@@ -13,7 +14,9 @@ namespace lumicut {
 // given up for one more, as long as it can be done. With exchange = 3 at least an eighth of the most there can be, and
 // usually nearly all. Disks are closed: two that touch in a point touch. Indices, ascending. Deterministic.
 // `start`: in place of the small ones first; refused if two of it touch.
-std::vector<uint32_t> independent_disks(std::span<const Disk> disks, int exchange,
-                                        std::span<const uint32_t> start = {});
+// Time and memory go by the pairs of disks that touch, whose square root is the number of disks where all do: more than
+// 2^28 pairs are refused.
+std::vector<uint32_t> independent_disks(std::span<const Disk> disks, int exchange, std::span<const uint32_t> start = {},
+                                        Progress* progress = nullptr);
 
 }  // namespace lumicut

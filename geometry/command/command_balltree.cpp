@@ -35,7 +35,7 @@ struct Balls {
 Balls read_balls(const std::string& path, bool with_radii) {
   auto file = open_text(path);
   size_t columns = 0;
-  const std::vector<double> table = read_table_csv(file, path, columns);
+  const std::vector<double> table = read_table_csv(file, path, columns, 1e15, with_radii);
   if (columns == 0) fail_argument(path + ": no balls");
   if (with_radii && columns == 1) fail_argument(path + ": one column, where centre and radius are wanted");
   Balls b;
@@ -107,7 +107,10 @@ int run(const Arguments& a) {
       continue;
     }
     const auto start = std::chrono::steady_clock::now();
-    const BallTree tree = BallTree::build(balls.centres, balls.radii, static_cast<int>(balls.dimension), builder);
+    const BallTree tree = [&, builder = builder] {
+      ProgressLine line;
+      return BallTree::build(balls.centres, balls.radii, static_cast<int>(balls.dimension), builder, &line.progress());
+    }();
     const double seconds = seconds_since(start);
     std::fprintf(stderr, "%-16s %zu balls, %zu dimensions: volume %.6g, depth %zu, %.3f s\n", name, tree.size(),
                  balls.dimension, tree.total_volume(), tree.depth(), seconds);

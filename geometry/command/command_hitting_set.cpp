@@ -76,12 +76,12 @@ int run(const Arguments& a) {
   if (a.disks.empty() == a.ranges.empty()) fail_argument("either --disks or --ranges is wanted");
   if (!a.shape.empty() && a.disks.empty()) fail_argument("--shape: not with --ranges");
   auto points_file = open_text(a.points);
-  const auto points = read_points_csv(points_file, a.points);
+  const auto points = read_points_csv(points_file, a.points, 1e70);
   Ranges ranges;
   std::vector<Disk> disks;
   if (a.ranges.empty()) {
     auto file = open_text(a.disks);
-    disks = read_disks_csv(file, a.disks);
+    disks = read_disks_csv(file, a.disks, 1e70);
   } else {
     auto file = open_text(a.ranges);
     for (const auto& row : read_index_rows_csv(file, a.ranges, points.size())) {
@@ -92,13 +92,17 @@ int run(const Arguments& a) {
   std::vector<Point2> shape;
   if (!a.shape.empty()) {
     auto file = open_text(a.shape);
-    shape = read_points_csv(file, a.shape);
+    shape = read_points_csv(file, a.shape, 1e70);
     ranges = points_in_copies(points, shape, disks);
   }
   const bool of_disks = a.ranges.empty() && a.shape.empty();
   if (!of_disks && !a.picture.empty()) fail_argument("--picture: of disks alone");
   const auto start = std::chrono::steady_clock::now();
-  const std::vector<uint32_t> chosen = of_disks ? solve(a, points, disks) : solve(a, points.size(), ranges);
+  const std::vector<uint32_t> chosen = [&] {
+    ProgressLine line;
+    line.progress().begin("hitting set", 0);
+    return of_disks ? solve(a, points, disks) : solve(a, points.size(), ranges);
+  }();
   std::fprintf(stderr, "%zu points hit %zu %s; %.2f s\n", chosen.size(),
                of_disks ? disks.size() : ranges.offsets.size() - 1, of_disks ? "disks" : "ranges",
                seconds_since(start));

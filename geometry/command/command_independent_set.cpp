@@ -21,11 +21,14 @@ int run(const Arguments& a) {
   check_output(a.out), check_output(a.picture);
   io::check_distinct({a.out == "-" ? "" : a.out, a.picture}, {a.disks, a.start});
   auto file = open_text(a.disks);
-  const std::vector<Disk> disks = read_disks_csv(file, a.disks);
+  const std::vector<Disk> disks = read_disks_csv(file, a.disks, 1e70);
   std::vector<uint32_t> from;
   if (!a.start.empty()) from = read_indices(a.start, disks.size(), "disks");
   const auto start = std::chrono::steady_clock::now();
-  const std::vector<uint32_t> chosen = independent_disks(disks, a.exchange, from);
+  const std::vector<uint32_t> chosen = [&] {
+    ProgressLine line;
+    return independent_disks(disks, a.exchange, from, &line.progress());
+  }();
   std::fprintf(stderr, "%zu of %zu disks; %.2f s\n", chosen.size(), disks.size(), seconds_since(start));
   std::string text = "index,x,y,radius\n";
   char line[128];

@@ -29,11 +29,11 @@ int run(const Arguments& a) {
   check_output(a.out), check_output(a.picture);
   io::check_distinct({a.out == "-" ? "" : a.out, a.picture}, {a.points, a.weights});
   auto file = open_text(a.points);
-  const auto points = read_points_csv(file, a.points);
+  const auto points = read_points_csv(file, a.points, 1e70);
   std::vector<double> weights;
   if (!a.weights.empty()) {
     auto weights_file = open_text(a.weights);
-    weights = read_numbers_csv(weights_file, a.weights, "weight");
+    weights = read_weights_csv(weights_file, a.weights);
     if (weights.size() != points.size())
       fail_argument(a.weights + ": " + std::to_string(weights.size()) + " weights of " + std::to_string(points.size()) +
                     " points");

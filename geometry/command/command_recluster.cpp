@@ -15,6 +15,7 @@
 #include "geometry/mesh_file.h"
 #include "geometry/texture_atlas.h"
 #include "io/atomic_file.h"
+#include "io/file_error.h"
 #include "io/scene_obj.h"
 
 namespace lumicut {
@@ -137,7 +138,7 @@ std::vector<double> weights_of(const Arguments& a, const FaceMesh& mesh) {
   std::vector<double> weights;
   if (!a.weights.empty()) {
     auto file = open_text(a.weights);
-    weights = read_numbers_csv(file, a.weights, "weight");
+    weights = read_weights_csv(file, a.weights);
     if (weights.size() != mesh.faces.size())
       fail_argument(a.weights + ": " + std::to_string(weights.size()) + " weights of " +
                     std::to_string(mesh.faces.size()) + " faces");
@@ -202,7 +203,10 @@ int run(const Arguments& a) {
   check_output(a.atlas), check_output(a.atlas_picture);
   io::check_distinct({a.atlas == "-" ? "" : a.atlas, a.atlas_picture});
   const Frames frames(a);
-  std::filesystem::create_directories(a.out);
+  std::error_code code;
+  std::filesystem::create_directories(a.out, code);
+  if (!std::filesystem::is_directory(a.out))
+    throw io::FileError("--out " + a.out, code ? "cannot be made a folder: " + code.message() : "is no folder");
   return a.method == "tree" ? by_tree(a, frames) : by_kmeans(a, frames);
 }
 

@@ -1,8 +1,12 @@
 // lumicut-geometry: the geometry library from the command line.
+#include <unistd.h>
+
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <iostream>
 #include <iterator>
+#include <new>
 
 #include "core/error.h"
 #include "geometry/command/commands.h"
@@ -43,17 +47,8 @@ void write_points(const std::string& path, const std::vector<Point2>& points, co
 }
 
 std::vector<uint32_t> read_indices(const std::string& path, size_t count, const char* of) {
-  std::vector<uint32_t> indices;
   auto file = open_text(path);
-  size_t columns = 0;
-  const std::vector<double> table = read_table_csv(file, path, columns);
-  for (size_t i = 0; i < table.size(); i += columns) {
-    const double v = table[i];
-    if (!(v >= 0 && v < static_cast<double>(count)) || v != static_cast<double>(static_cast<uint32_t>(v)))
-      fail_argument(path + ": index " + std::to_string(v) + " is of none of " + std::to_string(count) + " " + of);
-    indices.push_back(static_cast<uint32_t>(v));
-  }
-  return indices;
+  return read_indices_csv(file, path, count, of);
 }
 
 void add_picture_option(CLI::App& command, const std::string& option, std::string& path, const std::string& what,
@@ -76,7 +71,47 @@ void check_finite(const char* option, double value) {
   if (!std::isfinite(value)) fail_argument(std::string(option) + " is " + std::to_string(value));
 }
 
+ProgressLine::ProgressLine()
+    : thread_([this] {
+        std::unique_lock lock(mutex_);
+        const auto start = std::chrono::steady_clock::now();
+        for (auto wait = std::chrono::milliseconds(1000); !ended_.wait_for(lock, wait, [this] { return over_; });
+             wait = std::chrono::milliseconds(250)) {
+          const std::string share =
+              progress_.fraction() > 0 ? std::to_string(static_cast<int>(100 * progress_.fraction())) + " %, " : "";
+          std::fprintf(stderr, "\r%-60s",
+                       (std::string(progress_.phase()) + ": " + share +
+                        std::to_string(static_cast<int>(seconds_since(start))) + " s")
+                           .c_str());
+          shown_ = true;
+        }
+        if (shown_) std::fprintf(stderr, "\r%60s\r", "");
+      }) {}
+ProgressLine::~ProgressLine() {
+  {
+    const std::lock_guard lock(mutex_);
+    over_ = true;
+  }
+  ended_.notify_all();
+  thread_.join();
+}
+
 namespace {
+
+enum ExitCode { kFailed = 1, kBadInput = 2, kInterrupted = 130 };
+
+// Files are written whole or not at all, whenever it comes.
+void end_at_interrupts() {
+  struct sigaction action {};
+  action.sa_handler = [](int) {
+    constexpr char kText[] = "\nlumicut-geometry: interrupted\n";
+    if (write(STDERR_FILENO, kText, sizeof(kText) - 1) < 0) {
+    }
+    _exit(kInterrupted);
+  };
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
 
 int run(int argc, char** argv) {
   CLI::App app{"Ball trees, sliding hulls, hitting sets and epsilon-nets for disks, face clusters on deforming meshes"};
@@ -91,15 +126,22 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;  // --help is an error of code 0
+    return app.exit(error) == 0 ? 0 : kBadInput;  // --help is an error of code 0
   }
   try {
     for (const auto& [parsed, command] : commands)
       if (*parsed) return command();
-    return 1;
+    return kFailed;
+  } catch (const Error& e) {
+    const bool input = e.code() == ErrorCode::invalid_argument || e.code() == ErrorCode::invalid_state;
+    std::fprintf(stderr, "lumicut-geometry: %s\n", e.what());
+    return input ? kBadInput : kFailed;
+  } catch (const std::bad_alloc&) {
+    std::fputs("lumicut-geometry: out of memory\n", stderr);
+    return kFailed;
   } catch (const std::exception& e) {
     std::fprintf(stderr, "lumicut-geometry: %s\n", e.what());
-    return 1;
+    return kFailed;
   }
 }
 
@@ -108,5 +150,6 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   lumicut::io::open_standard_streams();
+  lumicut::end_at_interrupts();
   return lumicut::io::close_standard_output("lumicut-geometry", lumicut::run(argc, argv), 1);
 }

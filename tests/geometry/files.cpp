@@ -43,6 +43,7 @@ TEST(Csv, NamesTheLineAndTheFieldOfWhatIsWrong) {
   };
   EXPECT_NE(read("1,2,3\n1,nan,3\n").find("line 2: y is nan"), std::string::npos);
   EXPECT_NE(read("1,2,inf\n").find("radius is inf"), std::string::npos);
+  EXPECT_NE(read("1,2,3\n1,2,-3\n").find("line 2: radius is -3, below 0"), std::string::npos);
   EXPECT_NE(read("1,2\n").find("line 1: radius is missing"), std::string::npos);
   EXPECT_NE(read("1,2,3,4\n").find("more than 3 fields"), std::string::npos);
   EXPECT_NE(read("1,2,3\nx,y,r\n").find("line 2: x is missing or not a number"), std::string::npos);

@@ -3,6 +3,7 @@ import math
 import os
 import pathlib
 import random
+import signal
 import subprocess
 import tempfile
 import unittest
@@ -47,11 +48,55 @@ class GeometryCommand(unittest.TestCase):
         path.write_text("".join(line + "\n" for line in lines))
         return path
 
-    def refused(self, *arguments, says=(), text="", code=1):
+    def refused(self, *arguments, says=(), text="", code=2):
         done = run(*arguments, text=text)
         self.assertEqual(done.returncode, code, done.stderr)
         for part in says:
             self.assertIn(part, done.stderr)
+
+    def test_numbers_beyond_what_is_computed_with_are_named_by_line(self):
+        good, far = self.write("good.csv", ["0,0,1", "2,2,1"]), self.write("far.csv", ["# nothing", "0,0,1", "1e200,0,1"])
+        points = self.write("points.csv", ["0,0", "0,-1e71"])
+        self.refused("balltree", far, says=["far.csv, line 3", "column 1 is 1e200, beyond 1e+15"])
+        self.refused("balltree", self.write("minus.csv", ["0,0,1", "0,0,-1"]), "--radii", says=["minus.csv, line 2", "column 3 is -1, below 0"])
+        self.refused("balltree", good, "--queries", far, says=["far.csv, line 3"])
+        self.refused("independent-set", "--disks", far, says=["far.csv, line 3", "x is 1e200, beyond 1e+70"])
+        self.refused("independent-set", "--disks", self.write("minus.csv", ["0,0,-1"]), says=["line 1", "radius is -1, below 0"])
+        self.refused("independent-set", "--disks", good, "--start", self.write("s.csv", ["0", "1.5"]), says=["s.csv, line 2", "1.5"])
+        self.refused("hitting-set", "--points", points, "--disks", good, says=["points.csv, line 2", "y is -1e71"])
+
+    def test_a_folder_that_cannot_be_made_is_named(self):
+        mesh = self.write("m.obj", ["v 0 0 0", "v 1 0 0", "v 0 1 0", "f 1 2 3"])
+        for out in (mesh, mesh / "below"):
+            self.refused("recluster", mesh, "--frames", 1, "--clusters", 1, "--out", out, says=[f"lumicut-geometry: --out {out}: cannot be made a folder"], code=1)
+
+    def test_many_equal_or_overlapping_inputs_take_no_quadratic_time(self):
+        # A tenth of a second here; by all pairs, half a minute.
+        same = self.write("same.csv", ["0.5,0.5"] * 50000)
+        done = run("balltree", same, "--queries", same, "--count", 2)
+        self.assertEqual(done.stdout, "0,1\n" * 50000)
+        done = run("balltree", same, "--queries", same, "--kind", "best-mate")
+        self.assertEqual(done.stdout, "0\n" * 50000)
+        # Here every pair touches, and is looked at a few times.
+        done = run("independent-set", "--disks", self.write("disks.csv", [f"{self.random.random()},{self.random.random()},10" for _ in range(6000)]))
+        self.assertEqual(len(rows(done.stdout)), 1)
+
+    def test_long_work_tells_how_far_it_is_and_ends_at_ctrl_c(self):
+        line = self.write("line.csv", [f"{x},0" for x in range(200000)])
+        shown, terminal = os.openpty()
+        try:
+            process = subprocess.Popen([COMMAND, "balltree", line, "--builder", "insertion"], stderr=terminal, stdout=subprocess.DEVNULL)
+            said = b""
+            while b" %, " not in said:
+                self.assertIsNone(process.poll())
+                said += os.read(shown, 1000)
+            self.assertIn(b"ball tree: ", said)
+            process.send_signal(signal.SIGINT)
+            self.assertEqual(process.wait(30), 130)
+            self.assertIn(b"interrupted", os.read(shown, 10000))
+        finally:
+            os.close(shown)
+            os.close(terminal)
 
     # Hull
 
@@ -91,7 +136,7 @@ class GeometryCommand(unittest.TestCase):
         self.refused("hull", "-", text="0,0,0\n", says=["line 1", "more than x and y"])
         self.refused("hull", "-", text="-\n", says=["line 1"])
         self.refused("hull", "-", "--check-simple", text="0,0\n2,2\n2,0\n0,2\n", says=["line 4"])
-        self.refused("hull", self.folder / "none.csv", says=["none.csv"])
+        self.refused("hull", self.folder / "none.csv", says=["none.csv"], code=1)
 
     # Ball trees
 
@@ -146,7 +191,7 @@ class GeometryCommand(unittest.TestCase):
         file = self.write("b.csv", ["0,0,1", "1,1"])
         self.refused("balltree", file, says=["b.csv, line 2", "column 3"])
         self.refused("balltree", self.write("e.csv", ["# nothing"]), says=["e.csv", "no balls"])
-        self.refused("balltree", self.write("n.csv", ["0,0,-1"]), "--radii", says=["radi"])
+        self.refused("balltree", self.write("n.csv", ["0,0,-1"]), "--radii", says=["column 3 is -1"])
         three = self.write("three.csv", ["0,0,0"])
         self.refused("balltree", three, "--picture", self.folder / "t.svg", says=["three.csv", "3 dimensions"])
         self.refused("balltree", three, "--queries", self.write("two.csv", ["0,0"]), says=["two.csv", "2 dimensions"])
@@ -297,7 +342,7 @@ class GeometryCommand(unittest.TestCase):
                 self.assertTrue(all(boxes[label][k] - 1e-6 <= places[v][k] <= boxes[label][3 + k] + 1e-6 for k in range(3)))
         self.assertIn("4 charts", done.stdout)
         self.assertTrue((self.folder / "atlas.png").read_bytes().startswith(b"\x89PNG"))
-        self.refused("recluster", *frames, "--atlas", self.folder / "no/where.obj", says=["where.obj"])
+        self.refused("recluster", *frames, "--atlas", self.folder / "no/where.obj", says=["where.obj"], code=1)
 
     def test_metrics_seeds_filters_and_discs_are_options(self):
         sheet = self.grid("sheet.obj", 1.0)
