@@ -135,6 +135,16 @@ Rgb Bsdf::lambertian_intensity(const Rgb& flux) const {
 }
 
 std::optional<BsdfSample> Bsdf::sample_specular(float choice, float u, float v, Passage passage) const {
+  return specular_way({}, choice, u, v, passage);
+}
+
+std::array<std::optional<BsdfSample>, 3> Bsdf::specular_ways(float u, float v, Passage passage) const {
+  return {specular_way(Way::reflected, 0.0f, u, v, passage), specular_way(Way::coat, 0.0f, u, v, passage),
+          specular_way(Way::passed, 0.0f, u, v, passage)};
+}
+
+std::optional<BsdfSample> Bsdf::specular_way(std::optional<Way> way, float choice, float u, float v,
+                                             Passage passage) const {
   if (!specular_) return {};
   const bool straight = parameters_.shadows_pass && passage == Passage::straight;
   const GgxColors& c = colors_;
@@ -177,18 +187,29 @@ std::optional<BsdfSample> Bsdf::sample_specular(float choice, float u, float v, 
   const float sum = most_reflected + most_passed + of_coat;
   if (!(sum > 0.0f)) return {};
 
-  BsdfSample s;
+  const float of_way[] = {most_reflected, of_coat, most_passed};
   const float place = choice * sum;
-  const bool transmitted = most_passed > 0.0f && place >= most_reflected + of_coat;
-  if (!transmitted && of_coat > 0.0f && place >= most_reflected) {
+  const bool chosen = !way.has_value();
+  if (chosen) {
+    way = most_passed > 0.0f && place >= most_reflected + of_coat ? Way::passed
+          : of_coat > 0.0f && place >= most_reflected             ? Way::coat
+                                                                  : Way::reflected;
+  }
+  const float of_this = of_way[static_cast<size_t>(*way)];
+  if (!(of_this > 0.0f) && !chosen) return {};
+  BsdfSample s;
+  const bool transmitted = *way == Way::passed;
+  if (*way == Way::coat) {
     alpha = parameters_.coat_alpha;
     h = half_vector(alpha);
-    s.weight = Rgb{sum, sum, sum};
+    const float all = chosen ? sum : of_coat;
+    s.weight = Rgb{all, all, all};
   } else {
-    s.weight = transmitted ? passed * (sum / most_passed) : reflected * (sum / std::max(most_reflected, 1e-30f));
+    s.weight = transmitted ? passed : reflected;
+    if (chosen) s.weight *= sum / std::max(of_this, 1e-30f);
   }
   if (transmitted && straight) {
-    s.direction = -to_viewer_, s.flags = kSpecular | kTransmitted | kStraight;
+    s.direction = -to_viewer_, s.flags = kSpecular | kTransmitted | kStraight | kSharp;
     return s;
   }
   const Vec3f local = transmitted ? refract(view, h, cosine, ratio, refracted) : reflect(view, h);
@@ -201,6 +222,7 @@ std::optional<BsdfSample> Bsdf::sample_specular(float choice, float u, float v, 
   if (alpha >= kSmoothAlpha)
     s.weight *= transmitted ? masking_transmitted(alpha * alpha, nl) : masking_reflected(alpha * alpha, view.z, nl);
   s.flags = kSpecular | (transmitted ? kTransmitted : kReflected);
+  if (alpha < kSharpAlpha) s.flags |= kSharp;
   return s;
 }
 

@@ -85,6 +85,8 @@ class Bsdf {
   // more: what others lose is given back); solid angles that refraction narrows are not in it, since a closed body
   // widens them again.
   std::optional<BsdfSample> sample_specular(float choice, float u, float v, Passage passage = Passage::refracted) const;
+  // The same with nothing chosen: a direction of each way that there is, with what it carries alone.
+  std::array<std::optional<BsdfSample>, 3> specular_ways(float u, float v, Passage passage) const;
   // One direction out of all lobes for a light path, with Russian roulette by what they reflect, which keeps the flux of
   // all paths alike but for that factor of refraction: here it is, so that a single sheet looks as camera paths see it.
   // Straight through glass, where shadows pass. What leaves evenly does so by the geometric normal.
@@ -108,6 +110,9 @@ class Bsdf {
   bool passes_straight() const { return specular_ && parameters_.shadows_pass; }
 
  private:
+  enum class Way : uint8_t { reflected, coat, passed };
+  // `way`: that one alone; none: chosen by what each carries.
+  std::optional<BsdfSample> specular_way(std::optional<Way> way, float choice, float u, float v, Passage passage) const;
   // On the way to this surface: seen from inside, at least its own, whatever is known of where the ray set out.
   Rgb absorption_to(const Rgb& before) const { return behind_ ? max(before, parameters_.absorption) : before; }
   std::optional<ScatterSample> scatter_cosine(Rng& rng) const;

@@ -35,7 +35,8 @@ inline float lobe_importance(const SurfacePoint& p, float cosine, float beta) {
 
 // kStraight: through glass as if it were not there; what lies behind is lit and found by shadow rays too.
 // kGlossy: by a lobe that virtual lights shade.
-enum BsdfFlags : uint32_t { kReflected = 1, kTransmitted = 2, kSpecular = 4, kStraight = 8, kGlossy = 16 };
+// kSharp: by a specular lobe that is narrower than about a pixel.
+enum BsdfFlags : uint32_t { kReflected = 1, kTransmitted = 2, kSpecular = 4, kStraight = 8, kGlossy = 16, kSharp = 32 };
 
 struct BsdfSample {
   Vec3f direction;     // unit

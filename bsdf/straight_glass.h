@@ -11,6 +11,7 @@ namespace lumicut {
 
 inline constexpr uint32_t kMostStraight = 64;  // passages of one path: they count as no surface, and must end
 inline constexpr float kSmoothAlpha = 1e-4f;   // facets below turn directions by less than single precision tells
+inline constexpr float kSharpAlpha = 1e-3f;    // facets below turn directions by less than a pixel or two are wide
 
 // Share that goes straight on through one border, for the cosine to the geometric normal. Either side counts as the outer
 // one: in a slab light that was not bent meets the second border as it met the first, and is not totally reflected there.

@@ -99,7 +99,7 @@ void ClampCompensation::find_surface(Search& search, size_t ray, TracedPoints& h
     const float survive = std::min(1.0f, max_component(PointBsdf(point).albedo() * weight));
     if (!(rng.next_float() < survive)) continue;
     point.attenuate(weight / survive * c.share);
-    hits.found.push_back(point);
+    hits.add(point);
   }
 }
 

@@ -71,8 +71,9 @@ class Batch {
     const size_t most_further = scene_.most_layers() - 1;
     std::vector<SurfacePoint> further(most_further * found.size());  // layers after the first
     std::vector<uint8_t> further_count(most_further > 0 ? found.size() : 0, 0);
-    std::vector<std::optional<ChainRay>> chain(light_surfaces_ != nullptr ? found.size() : 0);
-    parallel_chunks(pixels_.size(), std::max<size_t>(1, 1024 / samples), [&](size_t begin, size_t end) {
+    const size_t chunk = std::max<size_t>(1, 1024 / samples);
+    std::vector<std::vector<ChainRay>> chains(pixels_.size() / chunk + 1);  // of each chunk
+    parallel_chunks(pixels_.size(), chunk, [&](size_t begin, size_t end) {
       if (context.progress.cancelled()) return;
       std::vector<RayHit> rays((end - begin) * samples);
       std::vector<float> cosines(rays.size());
@@ -101,12 +102,11 @@ class Batch {
           further_count[at] = static_cast<uint8_t>(layers.size() - 1);
           std::copy(layers.begin() + 1, layers.end(), further.begin() + static_cast<ptrdiff_t>(most_further * at));
         }
-        if (seen.bsdf.is_specular()) chain[at] = start_chain_of(seen.bsdf, p, i % samples);
+        if (seen.bsdf.is_specular()) start_chains_of(seen.bsdf, p, i % samples, chains[begin / chunk]);
         if (options_.lobes == 0) continue;
         limit(found[at], options_.lobes, 0);
         for (size_t k = 0; k < further_count_of(further_count, at); ++k)
           limit(further[most_further * at + k], options_.lobes, 0);
-        if (chain.size() > at && chain[at] && (chain[at]->state.kind & options_.lobes) == 0) chain[at].reset();
       }
       if (ways.empty()) return;
       Counters counters;
@@ -126,8 +126,7 @@ class Batch {
     }
     points_.finish();
     std::vector<ChainRay> rays;
-    for (const auto& ray : chain)
-      if (ray) rays.push_back(*ray);
+    for (const auto& of_chunk : chains) rays.insert(rays.end(), of_chunk.begin(), of_chunk.end());
     if (rays.empty()) return;
     Counters counters;
     follow_chains(scene_, *light_surfaces_, std::move(rays), context.progress, seen_, counters, options_.direct);
@@ -145,12 +144,15 @@ class Batch {
     counts_.assign(pixels_.size(), {});
     if (options_.denoise) residual_.assign(pixels_.size(), {});
     if (options_.occlusion > 0.0f) return occlude(context);
-    shade_levels(points_, nearby, compensation, light_, context, options_.denoise ? Noise::beside_lights : Noise::none);
-    for (size_t i = 0; i < seen_.light.size(); ++i) light_[slot(seen_.group[i])][seen_.pixel[i]] += seen_.light[i];
-    if (options_.denoise)
-      for (size_t i = 0; i < seen_.light.size(); ++i) residual_[seen_.pixel[i]] += seen_.light[i];
-    if (!seen_.found.empty())
-      shade_levels(seen_.points(), nearby, compensation, light_, context, options_.denoise ? Noise::all : Noise::none);
+    shade_levels(points_, nearby, compensation, light_, context, options_.denoise);
+    for (size_t i = 0; i < seen_.light.size(); ++i) {
+      light_[slot(seen_.group[i])][seen_.pixel[i]] += seen_.light[i];
+      if (options_.denoise && !seen_.seen_surely[i]) residual_[seen_.pixel[i]] += seen_.light[i];
+    }
+    if (!seen_.found.empty()) {
+      const ShadePoints points = seen_.points();
+      shade_levels(points, nearby, compensation, light_, context, options_.denoise, &seen_.found_surely);
+    }
     if (!options_.illuminance) return;
     // White Lambert surfaces show the irradiance over π.
     ShadePoints white;
@@ -166,7 +168,7 @@ class Batch {
     }
     white.finish();
     std::vector<std::vector<Rgb>> shown(methods_.size(), std::vector<Rgb>(pixels_.size()));
-    shade_levels(white, nearby, compensation, shown, context, Noise::none);
+    shade_levels(white, nearby, compensation, shown, context, false);
     illuminance_.assign(pixels_.size(), 0.0f);
     for (const auto& of_group : shown)
       for (size_t p = 0; p < pixels_.size(); ++p)
@@ -216,17 +218,17 @@ class Batch {
   // Chance ends chains long before.
   static constexpr uint32_t kMaxLevels = 64;
 
-  // What of the light is `residual_`, whose noise neighbours do not share: all but what virtual lights bring to the first
-  // points, unless the method chooses them anew at each.
-  enum class Noise { none, beside_lights, all };
-
+  // `residual`: whether `residual_` is kept, the light whose noise neighbours do not share: all but what virtual lights
+  // bring to the first points, unless the method chooses them anew at each. `surely`: of each first point, whether nothing
+  // on the way to it was left to chance, else that is of the residual too; null: to none was.
   void shade_levels(const ShadePoints& first, const NearbyLights* nearby, const ClampCompensation* compensation,
-                    std::vector<std::vector<Rgb>>& light, ShadeContext context, Noise noise) {
+                    std::vector<std::vector<Rgb>>& light, ShadeContext context, bool residual,
+                    const std::vector<bool>* surely = nullptr) {
     const ShadePoints* points = &first;
     ShadePoints found;
     for (uint32_t level = 1; level <= kMaxLevels && points->size() > 0; ++level) {
       context.progress.check();
-      add_light(*points, light, context, noise, level);
+      add_light(*points, light, context, residual, level, level == 1 ? surely : nullptr);
       Counters counters;
       TracedPoints hits;
       if (nearby != nullptr)
@@ -236,7 +238,7 @@ class Batch {
                             context.progress, hits, counters);
       context.stats.add(counters);
       for (size_t i = 0; i < hits.light.size(); ++i) light[slot(hits.group[i])][hits.pixel[i]] += hits.light[i];
-      if (noise != Noise::none)
+      if (residual)
         for (size_t i = 0; i < hits.light.size(); ++i) residual_[hits.pixel[i]] += hits.light[i];
       if (compensation == nullptr || options_.direct) return;
       found = hits.points();
@@ -251,27 +253,29 @@ class Batch {
     return g;
   }
 
-  void add_light(const ShadePoints& points, std::vector<std::vector<Rgb>>& light, ShadeContext context, Noise noise,
-                 uint32_t level) {
+  void add_light(const ShadePoints& points, std::vector<std::vector<Rgb>>& light, ShadeContext context, bool residual,
+                 uint32_t level, const std::vector<bool>* surely) {
     if (points.size() == 0) return;
     std::optional<ShadePoints> dimmed;
     for (size_t g = 0; g < methods_.size(); ++g) {
-      if (methods_[g].method != nullptr) add_light(*methods_[g].method, points, light[g], context, noise, level);
+      if (methods_[g].method != nullptr)
+        add_light(*methods_[g].method, points, light[g], context, residual, level, surely);
       if (methods_[g].bounced == nullptr) continue;
       if (!dimmed) dimmed = without_traced_gloss(points);
-      add_light(*methods_[g].bounced, *dimmed, light[g], context, noise, level);
+      add_light(*methods_[g].bounced, *dimmed, light[g], context, residual, level, surely);
     }
   }
 
   void add_light(const Integrator& method, const ShadePoints& points, std::vector<Rgb>& light, ShadeContext context,
-                 Noise noise, uint32_t level) {
+                 bool residual, uint32_t level, const std::vector<bool>* surely) {
     std::vector<Rgb> radiance(points.size());
     std::vector<PointCounts> counts(points.size());
     method.shade(points, radiance, counts, context);
-    const bool noisy =
-        noise == Noise::all || (noise == Noise::beside_lights && (level > 1 || method.chooses_at_each_point()));
-    if (noisy)
-      for (size_t i = 0; i < points.size(); ++i) residual_[points.pixel[i]] += radiance[i];
+    if (residual) {
+      const bool all = level > 1 || method.chooses_at_each_point();
+      for (size_t i = 0; i < points.size(); ++i)
+        if (all || (surely != nullptr && !(*surely)[i])) residual_[points.pixel[i]] += radiance[i];
+    }
     for (size_t i = 0; i < points.size(); ++i) {
       const uint32_t p = points.pixel[i];
       light[p] += radiance[i];
@@ -364,10 +368,16 @@ class Batch {
   }
 
   // What a mirror or glass goes on to show.
-  std::optional<ChainRay> start_chain_of(const Bsdf& bsdf, size_t p, size_t sample) const {
+  void start_chains_of(const Bsdf& bsdf, size_t p, size_t sample, std::vector<ChainRay>& chains) const {
     const auto [x, y] = pixels_[p];
-    return start_chain(bsdf, {1, 1, 1}, static_cast<uint32_t>(p),
-                       Rng(hash64(options_.seed, sample), Stage::compensation, x, y), {});
+    ChainRay::State from_camera;
+    from_camera.sure = true;
+    const size_t before = chains.size();
+    start_chains(bsdf, {1, 1, 1}, static_cast<uint32_t>(p),
+                 Rng(hash64(options_.seed, sample), Stage::compensation, x, y), from_camera, chains);
+    if (options_.lobes == 0) return;
+    const auto other = [&](const ChainRay& ray) { return (ray.state.kind & options_.lobes) == 0; };
+    chains.erase(std::remove_if(chains.begin() + static_cast<ptrdiff_t>(before), chains.end(), other), chains.end());
   }
 
   struct Pixel {

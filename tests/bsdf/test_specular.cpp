@@ -73,7 +73,7 @@ TEST(SpecularLobes, LightGoesStraightThroughGlassWhoseShadowsPass) {
     const Vec3f view = at(0.6f) * side;
     const auto straight = clear.bsdf(view).sample_specular(0.9f, 0.3f, 0.6f, Passage::straight);
     ASSERT_TRUE(straight);
-    EXPECT_EQ(straight->flags, kSpecular | kTransmitted | kStraight);
+    EXPECT_EQ(straight->flags, kSpecular | kTransmitted | kStraight | kSharp);
     EXPECT_EQ(straight->direction, -view);
     const auto camera = clear.follow(view, 0.9f), before = bends.follow(view, 0.9f);
     ASSERT_EQ(camera.has_value(), before.has_value());
@@ -109,6 +109,27 @@ TEST(SpecularLobes, WhiteGlassWhoseShadowsPassKeepsAllLightFromEitherSide) {
       }
       EXPECT_NEAR(all, 1, 0.025) << roughness << " " << cosine;  // of the table, and noise
     }
+}
+
+// What all ways carry together is what choosing one of them carries in the mean.
+TEST(SpecularLobes, AllWaysTogetherAreTheMeanOfOneByChance) {
+  Material metal = ggx({0.9f, 0.6f, 0.3f}, 0), lacquer = ggx({0.5f, 0.4f, 0.3f}, 0.6f);
+  metal.metallic = 1, metal.coat = 0.7f, lacquer.coat = 1;
+  for (const Material& m : {glass(0), glass(0.3f, 1.3f, {0.8f, 0.5f, 0.9f}), window(0), metal, lacquer})
+    for (const float cosine : {0.9f, 0.4f, -0.2f, -0.8f})
+      for (const Passage passage : {Passage::refracted, Passage::straight}) {
+        const OneSurface surface(m);
+        const Bsdf bsdf = surface.bsdf(at(cosine));
+        Rgb all{}, mean{};
+        for (const auto& s : bsdf.specular_ways(0.3f, 0.6f, passage))
+          if (s) all += s->weight;
+        constexpr int kChoices = 4000;
+        for (int i = 0; i < kChoices; ++i)
+          if (const auto s = bsdf.sample_specular((static_cast<float>(i) + 0.5f) / kChoices, 0.3f, 0.6f, passage))
+            mean += s->weight / kChoices;
+        EXPECT_GT(max_component(all), 0.01f);
+        EXPECT_LT(max_component(max(all - mean, mean - all)), 2e-3f) << cosine;  // three ways' steps of 1/4000
+      }
 }
 
 TEST(SpecularLobes, AMirrorReflectsExactly) {

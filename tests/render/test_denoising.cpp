@@ -106,6 +106,22 @@ TEST(DenoisingFeatures, GlassShowsWhatIsBehind) {
   EXPECT_NEAR(f.depth, 1.95f, 1e-3f);
 }
 
+// The same lights shine on all points that are seen in it, so that there is nothing to filter.
+TEST(Residual, OfWhatAMirrorShowsIsNoMoreThanOfWhatIsSeen) {
+  const auto share = [](const Material& panel) {
+    double residual = 0, radiance = 0;
+    render(*room(panel), true, {}, [&](const Film& film, const RenderLoop&) {
+      for (uint32_t y = 6; y < 12; ++y)
+        for (uint32_t x = 8; x < 16; ++x)
+          residual += *film.pixel(Channel::residual, x, y), radiance += *film.pixel(Channel::radiance, x, y);
+    });
+    return residual / radiance;
+  };
+  const double seen = share(test::diffuse(0.6f, 0.6f, 0.6f));
+  EXPECT_LT(seen, 0.3);
+  EXPECT_LT(share(mirror()), 0.3);
+}
+
 bool same(const Film& a, const Film& b, Channel c) {
   const size_t count = channel_table()[static_cast<size_t>(c)].components * size_t{kWidth} * kHeight;
   std::vector<float> x(count), y(count);

@@ -207,6 +207,28 @@ TEST(LightReach, MirrorsShowLampsAndSunsWithARadius) {
     }
 }
 
+// Not one pixel in ten, as bright as the lamp itself.
+TEST(LightReach, LacquerAndGlassShowLampsAsFresnelHasIt) {
+  Material lacquer = test::diffuse(0.1f, 0.1f, 0.1f);
+  lacquer.lobe = LobeModel::ggx, lacquer.specular = {}, lacquer.coat = 1, lacquer.coat_roughness = 0;
+  Material glass = test::diffuse(1, 1, 1);
+  glass.lobe = LobeModel::ggx, glass.specular = {1, 1, 1}, glass.roughness = 0, glass.transmission = 1;
+  const Vec3f up = normalize(Vec3f{0.2f, 1.9f, 1});
+  Light sun;
+  sun.type = LightType::sun, sun.value = {1, 1, 1}, sun.direction = -up, sun.radius = 0.15f;
+  const double radiance = 1 / (2 * M_PI * (1 - std::cos(0.15)));
+  for (const auto& [material, ior] : {std::pair{lacquer, lacquer.coat_ior}, {glass, glass.ior}})
+    for (const char* id : {"exhaustive", "path_tracer"}) {
+      const auto image = render(*floor(sun, material), id);
+      float refracted = 0;
+      // Over the sun's disc the share falls with the height by up to a half.
+      const double share = fresnel_reflectance(up.z, ior, refracted);
+      const double most = std::max_element(image.begin(), image.end(), [](Rgb a, Rgb b) { return a.x < b.x; })->x;
+      EXPECT_GT(most, share * radiance) << id;
+      EXPECT_LT(most, 2 * share * radiance) << id;
+    }
+}
+
 TEST(LightReach, WorldsAreSeenByKindsOfRays) {
   const auto lit = [](uint32_t seen_by, const Material& right, const char* id) {
     return render(*floor(bulb(0), right,
