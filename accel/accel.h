@@ -47,8 +47,8 @@ struct RayHit {
   Hit hit;
 };
 
-// Where an occlusion query's ray meets a surface. `dir`, of any length, is in the mesh's own space.
-struct LightHit {
+// Where a ray meets a surface. `dir`, of any length, is in the mesh's own space.
+struct CandidateHit {
   uint32_t mesh, inst, prim;  // as in Hit
   float u, v;
   Vec3f dir;
@@ -60,9 +60,9 @@ class HitFilter {
  public:
   virtual ~HitFilter() = default;
   // True where any ray passes through the surface: meshes with `has_cutout`.
-  virtual bool passes(uint32_t mesh, uint32_t prim, float u, float v) const = 0;
+  virtual bool passes(const CandidateHit& hit) const = 0;
   // The same for rays of occlusion queries, of meshes with `has_cutout` or `passes_light`.
-  virtual bool passes_light(const LightHit& hit) const { return passes(hit.mesh, hit.prim, hit.u, hit.v); }
+  virtual bool passes_light(const CandidateHit& hit) const { return passes(hit); }
 };
 
 // Views of the caller's memory, which must outlive the Accel.

@@ -57,31 +57,26 @@ struct FilterUser {
   uint32_t mesh = 0;
 };
 
-// Both are called for one ray or for a packet.
+// Of one ray or a packet, which Embree has taken to the mesh's space.
+CandidateHit candidate(const RTCFilterFunctionNArguments* args, uint32_t mesh, unsigned i) {
+  const unsigned n = args->N;
+  return {mesh,
+          RTCHitN_instID(args->hit, n, i, 0),
+          RTCHitN_primID(args->hit, n, i),
+          RTCHitN_u(args->hit, n, i),
+          RTCHitN_v(args->hit, n, i),
+          {RTCRayN_dir_x(args->ray, n, i), RTCRayN_dir_y(args->ray, n, i), RTCRayN_dir_z(args->ray, n, i)}};
+}
 void on_filter(const RTCFilterFunctionNArguments* args) {
   const auto& user = *static_cast<const FilterUser*>(args->geometryUserPtr);
-  for (unsigned i = 0; i < args->N; ++i) {
-    if (args->valid[i] == 0) continue;
-    if (user.filter->passes(user.mesh, RTCHitN_primID(args->hit, args->N, i), RTCHitN_u(args->hit, args->N, i),
-                            RTCHitN_v(args->hit, args->N, i)))
-      args->valid[i] = 0;
-  }
+  for (unsigned i = 0; i < args->N; ++i)
+    if (args->valid[i] != 0 && user.filter->passes(candidate(args, user.mesh, i))) args->valid[i] = 0;
 }
-// Of occlusion queries. Embree has taken the ray to the mesh's space.
+// Of occlusion queries.
 void on_light_filter(const RTCFilterFunctionNArguments* args) {
   const auto& user = *static_cast<const FilterUser*>(args->geometryUserPtr);
-  const unsigned n = args->N;
-  for (unsigned i = 0; i < n; ++i) {
-    if (args->valid[i] == 0) continue;
-    const LightHit hit{
-        user.mesh,
-        RTCHitN_instID(args->hit, n, i, 0),
-        RTCHitN_primID(args->hit, n, i),
-        RTCHitN_u(args->hit, n, i),
-        RTCHitN_v(args->hit, n, i),
-        {RTCRayN_dir_x(args->ray, n, i), RTCRayN_dir_y(args->ray, n, i), RTCRayN_dir_z(args->ray, n, i)}};
-    if (user.filter->passes_light(hit)) args->valid[i] = 0;
-  }
+  for (unsigned i = 0; i < args->N; ++i)
+    if (args->valid[i] != 0 && user.filter->passes_light(candidate(args, user.mesh, i))) args->valid[i] = 0;
 }
 
 // Embree binds an allocator of each building thread to the scene's. When memory runs out during that, it stays bound to

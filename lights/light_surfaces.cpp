@@ -41,10 +41,11 @@ float LightSurfaces::area(const Light& light) {
 }
 
 // The corners of a disk's parallelogram let rays through.
-bool LightSurfaces::passes(uint32_t, uint32_t prim, float u, float v) const {
-  if (scene_.lights()[lights_[prim / 2]].type != LightType::disk) return false;
+bool LightSurfaces::passes(const CandidateHit& hit) const {
+  if (scene_.lights()[lights_[hit.prim / 2]].type != LightType::disk) return false;
   // From the corner (-1/2, -1/2) to its two followers.
-  const float x = prim % 2 == 0 ? u + v : u, y = prim % 2 == 0 ? v : u + v;
+  const float across = hit.u + hit.v;
+  const float x = hit.prim % 2 == 0 ? across : hit.u, y = hit.prim % 2 == 0 ? hit.v : across;
   return (x - 0.5f) * (x - 0.5f) + (y - 0.5f) * (y - 0.5f) > 0.25f;
 }
 

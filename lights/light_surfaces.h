@@ -44,7 +44,7 @@ class LightSurfaces final : private HitFilter {
   bool next(const Vec3f& origin, const Vec3f& direction, float& near, float far, Hit& hit) const;
   bool meet_lamp(uint32_t lamp, const Vec3f& origin, const Vec3f& direction, float far, Hit& hit) const;
   bool meet_sun(uint32_t sun, const Vec3f& direction, Hit& hit) const;
-  bool passes(uint32_t mesh, uint32_t prim, float u, float v) const override;
+  bool passes(const CandidateHit& hit) const override;
 
   const Scene& scene_;
   std::vector<uint32_t> lights_;

@@ -28,6 +28,8 @@ float largest_term(const Transform& t, const Vec3f& p) {
 }
 
 constexpr float kInvPi = 0.31830988618f;
+// A viewer that sees about the mean of what depends on the view.
+Vec3f mean_view(const Vec3f& normal) { return normal * (2.0f / 3.0f) + Frame(normal).t * 0.745356f; }
 // Over which the slope of a program's bumps is taken: a share of the distance, and of a hit's offset.
 constexpr float kBumpStep = 5e-4f, kLeastBumpStep = 50.0f;
 
@@ -350,16 +352,19 @@ const Transform& Scene::instance(uint32_t mesh, uint32_t index) const {
   return meshes_[mesh].instances.empty() ? identity : meshes_[mesh].instances[index];
 }
 
-bool Scene::passes(uint32_t mesh, uint32_t prim, float u, float v) const {
-  return passes_by_chance(opacity(mesh, prim, u, v), mesh, prim, u, v);
+bool Scene::passes(const CandidateHit& hit) const {
+  const uint32_t instance_index = hit.inst != kNoId ? hit.inst - first_instance_[hit.mesh] : 0;
+  return passes_by_chance(opacity(hit.mesh, hit.prim, hit.u, hit.v, instance_index, &hit.dir), hit.mesh, hit.prim,
+                          hit.u, hit.v);
 }
 
 // Visibility is a yes or no, so that the chance is the luminance of what passes.
-bool Scene::passes_light(const LightHit& hit) const {
+bool Scene::passes_light(const CandidateHit& hit) const {
   const Mesh& mesh = meshes_[hit.mesh];
   const uint32_t id = mesh.material_of(hit.prim);
   const uint32_t instance_index = hit.inst != kNoId ? hit.inst - first_instance_[hit.mesh] : 0;
-  float stops = opacity(hit.mesh, hit.prim, hit.u, hit.v, instance_index);
+  // Rays go from the light or to it: which side they meet is not told.
+  float stops = opacity(hit.mesh, hit.prim, hit.u, hit.v, instance_index, &hit.dir, true);
   if (stops > 0.0f && materials_[id].shadows_pass) {
     const uint32_t* t = &mesh.indices[3 * size_t{hit.prim}];
     const Vec3f& corner = mesh.positions[t[0]];
@@ -391,14 +396,20 @@ bool Scene::passes_light(const LightHit& hit) const {
   return passes_by_chance(stops, hit.mesh, hit.prim, hit.u, hit.v);
 }
 
-float Scene::opacity(uint32_t mesh_id, uint32_t prim, float u, float v, uint32_t instance_index) const {
+float Scene::opacity(uint32_t mesh_id, uint32_t prim, float u, float v, uint32_t instance_index, const Vec3f* local_dir,
+                     bool from_front) const {
   const Mesh& mesh = meshes_[mesh_id];
   const Material& material = materials_[mesh.material_of(prim)];
   float opacity = material.opacity;
   if (material.opacity_texture < 0) return opacity;
   if (const TextureProgram* program = textures_[material.opacity_texture].program()) {
     const SurfaceHit place = place_on(mesh_id, prim, u, v, instance_index);
-    const SurfaceView view{place.position, place.geometric_normal, place.normal, place.geometric_normal, place.offset};
+    Vec3f to_viewer = place.geometric_normal;
+    if (program->varies_with_view())
+      to_viewer = local_dir == nullptr ? mean_view(place.geometric_normal)
+                                       : -normalize(instance(mesh_id, instance_index).vector(*local_dir));
+    if (from_front && dot(to_viewer, place.geometric_normal) < 0.0f) to_viewer = -to_viewer;
+    const SurfaceView view{place.position, place.geometric_normal, place.normal, to_viewer, place.offset};
     return opacity * std::clamp(programmed(*program, view, place.uv, &place).x, 0.0f, 1.0f);
   }
   if (!mesh.uvs.empty()) {
@@ -606,11 +617,10 @@ Rgb Scene::emitted(const SurfaceHit& hit, const Vec3f& to_viewer) const {
 
 // As it is seen at the mean cosine of what a surface sends out evenly.
 Rgb Scene::emitted_on_average(const SurfaceHit& hit, const Vec3f& normal) const {
-  constexpr float kCosine = 2.0f / 3.0f, kSine = 0.745356f;
   const int32_t texture = materials_[hit.material].emission_texture;
   const TextureProgram* program = texture < 0 ? nullptr : textures_[texture].program();
   if (program == nullptr || !program->varies_with_view()) return emitted(hit, normal);
-  return emitted(hit, normal * kCosine + Frame(normal).t * kSine);
+  return emitted(hit, mean_view(normal));
 }
 
 Vec2f Scene::environment_uv(const Vec3f& direction) const {

@@ -133,7 +133,9 @@ class Scene final : private HitFilter {
   // About the mean of that over the side that `normal` points to, where the view makes a difference.
   Rgb emitted_on_average(const SurfaceHit& hit, const Vec3f& normal) const;
   // Share of rays that a place of a triangle stops: factor times mask.
-  float opacity(uint32_t mesh, uint32_t prim, float u, float v, uint32_t instance = 0) const;
+  // `local_dir`: of the ray, in the mesh's own space; without one it is about the mean over views from the front.
+  float opacity(uint32_t mesh, uint32_t prim, float u, float v, uint32_t instance = 0, const Vec3f* local_dir = nullptr,
+                bool from_front = false) const;
   // Whether what surfaces look like depends on the camera.
   bool asks_for_camera() const { return asks_for_camera_; }
 
@@ -152,8 +154,8 @@ class Scene final : private HitFilter {
   Rgb programmed(const TextureProgram& program, const SurfaceView& view, Vec2f uv, const SurfaceHit* hit) const;
   Vec3f bumped_normal(const Material& material, const Vec3f& normal, Vec2f uv, const Vec3f& along_u,
                       const Vec3f& along_v) const;
-  bool passes(uint32_t mesh, uint32_t prim, float u, float v) const override;
-  bool passes_light(const LightHit& hit) const override;
+  bool passes(const CandidateHit& hit) const override;
+  bool passes_light(const CandidateHit& hit) const override;
   void check_references() const;
 
   Config config_;

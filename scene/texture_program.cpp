@@ -932,6 +932,8 @@ bool TextureProgram::varies_with_instance() const {
   return has(ProgramOp::attribute) || has(ProgramOp::transform) || has(ProgramOp::position) || has(ProgramOp::normal) ||
          asks_for_camera();
 }
-bool TextureProgram::varies_with_view() const { return has(ProgramOp::to_viewer) || has(ProgramOp::fresnel); }
+bool TextureProgram::varies_with_view() const {
+  return has(ProgramOp::to_viewer) || has(ProgramOp::fresnel) || has(ProgramOp::behind);
+}
 
 }  // namespace lumicut

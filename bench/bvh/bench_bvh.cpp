@@ -354,7 +354,7 @@ void means(const Ratios& ratios, const std::vector<Contender>& contenders) {
 }
 
 struct NoHole : HitFilter {
-  bool passes(uint32_t, uint32_t, float, float) const override { return false; }
+  bool passes(const CandidateHit&) const override { return false; }
 };
 
 // What one mesh needs for all ray tables.

@@ -677,13 +677,13 @@ class Materials:
             if value.picture is not None and value.is_zero():
                 value = ZERO
             if value.picture is not None and value.picture.is_by_view() and slot in ("emission", "opacity"):
-                varies = not np.ptp(value.picture.linear()) < 1e-6
-                if varies and slot == "emission":
-                    value = Value(value.factor, ProgramPicture(name, of_picture(value.picture)))
-                else:
-                    if varies:
-                        self.report.note(f"{name} ({slot})", "Holes that depend on the view, taken as their mean")
+                linear = value.picture.linear()
+                if np.ptp(linear) < 1e-6:
                     value = Value(np.round(value.mean(), 6))
+                else:
+                    if slot == "opacity" and (ray == "shadow" or not surface.by_ray) and np.ptp(linear - linear[:, ::-1]) > 1e-3:
+                        self.report.note(name, "Holes on one side, which to light are as from the front")
+                    value = Value(value.factor, ProgramPicture(name, of_picture(value.picture)))
             factors[slot] = np.maximum(np.nan_to_num(value.factor), 0)
             if value.picture is not None:
                 pictures[slot] = value.picture

@@ -36,6 +36,13 @@ bool hit_triangle(const Vec3f& a, const Vec3f& b, const Vec3f& c, const Vec3f& o
   return u >= 0 && v >= 0 && u + v <= 1;
 }
 
+// The vector that `t` takes to `v`.
+Vec3f solved(const Transform& t, const Vec3f& v) {
+  const Vec3f a = t.vector({1, 0, 0}), b = t.vector({0, 1, 0}), c = t.vector({0, 0, 1});
+  const float det = dot(a, cross(b, c));
+  return Vec3f{dot(v, cross(b, c)), dot(v, cross(c, a)), dot(v, cross(a, b))} * (1.0f / det);
+}
+
 // A host whose ray tracing is a loop over all triangles.
 struct LoopHost {
   AccelGeometry geometry;
@@ -55,9 +62,12 @@ struct LoopHost {
         }
         double t, u, v;
         if (!hit_triangle(p[0], p[1], p[2], r.org, r.dir, t, u, v) || !(t > r.tnear && t < r.tfar)) continue;
-        if (mesh.has_cutout && geometry.filter != nullptr &&
-            geometry.filter->passes(m, k, static_cast<float>(u), static_cast<float>(v)))
-          continue;
+        if (mesh.has_cutout && geometry.filter != nullptr) {
+          Vec3f local = r.dir;
+          if (!geometry.instances.empty()) local = solved(geometry.instances[i].to_world, r.dir);
+          const uint32_t inst = geometry.instances.empty() ? kNoId : i;
+          if (geometry.filter->passes({m, inst, k, static_cast<float>(u), static_cast<float>(v), local})) continue;
+        }
         fn(m, k, geometry.instances.empty() ? kNoId : i, t, u, v);
       }
     }
@@ -234,7 +244,7 @@ TEST_P(Backends, MaskHidesAMesh) {
 
 // A hole where u < 1/2, on every triangle of mesh `mesh`.
 struct HalfHole : HitFilter {
-  bool passes(uint32_t, uint32_t, float u, float) const override { return u < 0.5f; }
+  bool passes(const CandidateHit& hit) const override { return hit.u < 0.5f; }
 };
 
 TEST_P(Backends, CutOutLetsTheRayThrough) {
@@ -253,6 +263,28 @@ TEST_P(Backends, CutOutLetsTheRayThrough) {
   accel->occluded_from_point({{0.45f, 0.2f, -1e5f}, false}, px, py, pz, 2, out);
   EXPECT_EQ(out[0], 0);
   EXPECT_EQ(out[1], 1);
+}
+
+// A hole for rays that go up in the mesh's own space.
+struct HoleFromBelow : HitFilter {
+  bool passes(const CandidateHit& hit) const override { return hit.dir.z > 0.0f; }
+};
+
+TEST_P(Backends, FiltersAreToldTheDirectionInTheMeshsSpace) {
+  const Mesh mesh = unit_triangle(0);
+  const HoleFromBelow filter;
+  Transform over;
+  over.m[10] = -1;  // what is up is down
+  AccelGeometry geometry{{mesh.view()}, {{0, Transform{}}, {0, over}}, &filter};
+  geometry.meshes[0].has_cutout = true;
+  const auto accel = make(geometry);
+  EXPECT_EQ(first(*accel, ray_of({0.2f, 0.2f, -1}, {0, 0, 1})).hit.inst, 1u);
+  EXPECT_EQ(first(*accel, ray_of({0.2f, 0.2f, 1}, {0, 0, -1})).hit.inst, 0u);
+  geometry.instances = {{0, Transform{}}};
+  const auto one = make(geometry);
+  EXPECT_EQ(first(*one, ray_of({0.2f, 0.2f, -1}, {0, 0, 1})).hit.geom, kNoId);
+  EXPECT_TRUE(blocked(*one, ray_of({0.2f, 0.2f, 1}, {0, 0, -1})));
+  EXPECT_FALSE(blocked(*one, ray_of({0.2f, 0.2f, -1}, {0, 0, 1})));
 }
 
 TEST_P(Backends, InstancesMoveMirrorAndScale) {

@@ -227,6 +227,46 @@ class Materials(unittest.TestCase):
         np.testing.assert_allclose(a.mean((0, 1)), b.mean((0, 1)), rtol=0.02)
         self.assertEqual(h.last_notes(), [])
 
+    def mixed_with_holes(self, name, colour, factor):
+        """Transparent and a diffuse colour; factor(tree): the output that says how much of the second there is."""
+        m = h.material(name)
+        tree = m.node_tree
+        mix, clear, matt = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("MixShader", "BsdfTransparent", "BsdfDiffuse"))
+        matt.inputs["Color"].default_value = (*colour, 1)
+        for source, socket in ((factor(tree), 0), (clear.outputs[0], 1), (matt.outputs[0], 2)):
+            tree.links.new(source, mix.inputs[socket])
+        tree.links.new(mix.outputs[0], next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL").inputs["Surface"])
+        return m
+
+    def test_holes_follow_the_view(self):
+        """Walls that the camera sees through from behind, and a ball that fades towards its edge."""
+        def from_behind(tree):
+            sides, rays, both, rest = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("NewGeometry", "LightPath", "Math", "Math"))
+            both.operation, rest.operation, rest.inputs[0].default_value = "MULTIPLY", "SUBTRACT", 1
+            tree.links.new(sides.outputs["Backfacing"], both.inputs[0])
+            tree.links.new(rays.outputs["Is Camera Ray"], both.inputs[1])
+            tree.links.new(both.outputs[0], rest.inputs[1])
+            return rest.outputs[0]
+
+        def facing(tree):
+            weight, rest = tree.nodes.new("ShaderNodeLayerWeight"), tree.nodes.new("ShaderNodeMath")
+            rest.operation, rest.inputs[0].default_value = "SUBTRACT", 1
+            tree.links.new(weight.outputs["Facing"], rest.inputs[1])
+            return rest.outputs[0]
+
+        h.set_world((0.5, 0.5, 0.5))
+        wall = self.mixed_with_holes("wall", (0.8, 0.4, 0.2), from_behind)
+        h.add_mesh("Front", [(-2, -2, 1), (2, -2, 1), (2, 2, 1), (-2, 2, 1)], [(3, 2, 1, 0)], wall)  # its back to the camera
+        h.add_mesh("Floor", [(-2, -2, -2), (2, -2, -2), (2, 2, -2), (-2, 2, -2)], [(0, 1, 2, 3)], wall)
+        h.add_sphere(0.6, material=self.mixed_with_holes("veil", (0.1, 0.3, 0.8), facing), segments=48)
+        bpy.context.scene.camera.location = (0, 0, 5)
+        bpy.context.scene.camera.data.type, bpy.context.scene.camera.data.ortho_scale = "ORTHO", 2
+        ours, theirs = h.both(256, 64, 0)
+        a, b = (h.blocks(image["Combined"][..., :3], 8) for image in (ours, theirs))
+        np.testing.assert_allclose(a, b, rtol=0.08, atol=0.02)
+        np.testing.assert_allclose(a.mean((0, 1)), b.mean((0, 1)), rtol=0.02)
+        self.assertEqual(h.last_notes(), [])
+
     def panes(self, shader):
         """A floor half under a pane that `shader` makes of its tree, seen from above: Cycles' means of both halves and ours."""
         scene = h.new_scene(32, 32)
