@@ -231,6 +231,7 @@ void check_gltf_document(const std::string& path, const std::string& bytes) {
     std::memcpy(&length, bytes.data() + 12, sizeof(length));
     if (length > bytes.size() - kStart) return;  // tinygltf refuses it
     text = bytes.substr(kStart, length);
+    text.resize(text.find_last_not_of('\0') + 1);  // some fill the chunk with these in place of spaces
   }
   Document(parse_json(text, path), path).check();
 }

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "io/file_error.h"
+#include "io/text_lines.h"
 
 namespace lumicut::io {
 
@@ -69,16 +70,21 @@ Json parse_json(const std::string& text, const std::string& file) {
       throw FileError(file, fmt::format("the key {} stands twice in one object", shown(json(parsed))));
     return true;
   };
+  const auto place = [&](size_t end) {
+    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(end), '\n');
+    const size_t line_start = end == 0 ? std::string::npos : text.rfind('\n', end - 1);
+    return fmt::format("line {}, column {}", line, line_start == std::string::npos ? end + 1 : end - line_start);
+  };
+  refuse_utf16(text, file);
+  if (const size_t zero = text.find('\0'); zero != std::string::npos)  // the parser would end there
+    throw FileError(file, fmt::format("{}: not JSON: a zero byte", place(zero)));
   try {
     return Json::parse(text, watch);
   } catch (const json::parse_error& error) {
     const size_t end = std::min(text.size(), error.byte > 0 ? error.byte - 1 : 0);
-    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(end), '\n');
-    const size_t line_start = end == 0 ? std::string::npos : text.rfind('\n', end - 1);
-    const size_t column = line_start == std::string::npos ? end + 1 : end - line_start;
     std::string what = error.what();
     if (const size_t colon = what.find(": "); colon != std::string::npos) what = what.substr(colon + 2);
-    throw FileError(file, fmt::format("line {}, column {}: not JSON: {}", line, column, what));
+    throw FileError(file, fmt::format("{}: not JSON: {}", place(end), what));
   } catch (const json::exception& error) {  // such as a number beyond the range of double
     throw FileError(file, fmt::format("not readable as JSON: {}", error.what()));
   }
@@ -157,7 +163,7 @@ JsonObject::JsonObject(const JsonValue& value) : value_(value) {
 }
 
 std::optional<JsonValue> JsonObject::find(const std::string& key) {
-  known_.push_back(key);
+  if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.push_back(key);
   const auto at = value_.raw().find(key);
   if (at == value_.raw().end()) return std::nullopt;
   return JsonValue(*at, value_.file(), value_.path().empty() ? key : value_.path() + "." + key);

@@ -6,10 +6,16 @@
 
 namespace lumicut::io {
 
+void refuse_utf16(std::string_view text, const std::string& path) {
+  const bool marked = text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff");
+  // Of the first letter, which is an ASCII one, one byte is 0.
+  const bool unmarked = text.size() >= 2 && (text[0] == '\0') != (text[1] == '\0');
+  if (marked || unmarked) throw FileError(path, "is UTF-16 text; save it as UTF-8");
+}
+
 std::string plain_text(std::string text, const std::string& path) {
-  const auto begins = [&](const char* mark, size_t size) { return text.compare(0, size, mark, size) == 0; };
-  if (begins("\xff\xfe", 2) || begins("\xfe\xff", 2)) throw FileError(path, "is UTF-16 text; save it as UTF-8");
-  if (begins("\xef\xbb\xbf", 3)) text.erase(0, 3);
+  refuse_utf16(text, path);
+  if (text.starts_with("\xef\xbb\xbf")) text.erase(0, 3);
   size_t out = text.find('\r');
   if (out == std::string::npos) return text;
   for (size_t in = out; in < text.size(); ++in) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace lumicut::io {
@@ -9,6 +10,9 @@ namespace lumicut::io {
 // Without a byte-order mark; every line ends with '\n', whether the file has LF, CRLF or CR. Throws FileError for
 // UTF-16, which would be read as garbage.
 std::string plain_text(std::string text, const std::string& path);
+
+// Throws FileError for UTF-16, with a byte-order mark or without.
+void refuse_utf16(std::string_view text, const std::string& path);
 
 // ASCII letters alone.
 std::string lower(std::string text);

@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <functional>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "film/metrics.h"
@@ -62,17 +64,22 @@ std::vector<float> load(const std::string& path, const std::string& layer, io::I
   return rgb;
 }
 
-void write_grey(const std::string& path, const std::vector<float>& values, const io::Image& image) {
+// Writes what is computed already.
+using Writer = std::function<void()>;
+
+Writer grey_writer(const std::string& path, const std::vector<float>& values, const io::Image& image) {
   std::vector<uint8_t> bytes;
   for (const float v : values) bytes.push_back(static_cast<uint8_t>(v * 255.0f + 0.5f));
-  io::write_png(path, bytes, image.width, image.height, 1);
+  return [path, bytes = std::move(bytes), width = image.width, height = image.height] {
+    io::write_png(path, bytes, width, height, 1);
+  };
 }
 
 bool is_exr(const std::string& path) { return path.size() > 4 && path.substr(path.size() - 4) == ".exr"; }
 
 // The relative error of every pixel: false colour in a PNG, or the numbers in an EXR.
-void write_error_map(const std::string& path, std::vector<float> errors, const io::Image& frame, bool with_sign,
-                     double top) {
+Writer error_map_writer(const std::string& path, std::vector<float> errors, const io::Image& frame, bool with_sign,
+                        double top) {
   if (!with_sign)
     for (float& e : errors) e = std::abs(e);
   if (is_exr(path)) {
@@ -80,11 +87,11 @@ void write_error_map(const std::string& path, std::vector<float> errors, const i
     out.width = frame.width, out.height = frame.height, out.x0 = frame.x0, out.y0 = frame.y0;
     out.frame_width = frame.frame_width, out.frame_height = frame.frame_height;
     out.layers.push_back({with_sign ? "signed_relative_error" : "relative_error", 1, std::move(errors)});
-    io::write_exr(path, out, false);
-    return;
+    return [path, out = std::move(out)] { io::write_exr(path, out, false); };
   }
-  const ColorImage picture = error_color_map(errors, frame.width, frame.height, with_sign, top);
-  io::write_png(path, picture.pixels, picture.width, picture.height, 3);
+  return [path, picture = error_color_map(errors, frame.width, frame.height, with_sign, top)] {
+    io::write_png(path, picture.pixels, picture.width, picture.height, 3);
+  };
 }
 
 void compare(const Options& options) {
@@ -93,6 +100,8 @@ void compare(const Options& options) {
   io::check_distinct(outputs, {options.image, options.reference});
   for (const auto& path : outputs)
     if (!path.empty()) io::check_writable(path);
+  auto computing = std::make_unique<NothingToLose>();
+  std::vector<Writer> writers;
   io::Image a, b;
   const auto image_pixels = load(options.image, options.layer, a);
   const auto reference_pixels =
@@ -134,24 +143,30 @@ void compare(const Options& options) {
   if (options.hdr_flip) json["hdr_flip"] = m.hdr_flip;
   const auto exposure = static_cast<float>(m.exposure);
   if (!options.error_image.empty())
-    write_grey(options.error_image, error_image(image, reference, exposure, options.scale), a);
+    writers.push_back(grey_writer(options.error_image, error_image(image, reference, exposure, options.scale), a));
   if (!options.error_map.empty() || !options.signed_error_map.empty()) {
     const std::vector<float> errors = relative_error_image(image, reference);
     const auto top = static_cast<double>(options.error_map_top);
-    if (!options.error_map.empty()) write_error_map(options.error_map, errors, a, false, top);
-    if (!options.signed_error_map.empty()) write_error_map(options.signed_error_map, errors, a, true, top);
+    if (!options.error_map.empty()) writers.push_back(error_map_writer(options.error_map, errors, a, false, top));
+    if (!options.signed_error_map.empty())
+      writers.push_back(error_map_writer(options.signed_error_map, errors, a, true, top));
   }
   if (!options.flip_image.empty()) {
     std::vector<float> x(image_pixels), y(reference_pixels);
     for (float& v : x) v *= exposure;
     for (float& v : y) v *= exposure;
-    write_grey(
+    writers.push_back(grey_writer(
         options.flip_image,
         flip_image({x, image.width, image.height}, {y, image.width, image.height}, metric_options.pixels_per_degree),
-        a);
+        a));
   }
   if (!options.hdr_flip_image.empty())
-    write_grey(options.hdr_flip_image, hdr_flip_image(image, reference, metric_options.pixels_per_degree).image, a);
+    writers.push_back(grey_writer(options.hdr_flip_image,
+                                  hdr_flip_image(image, reference, metric_options.pixels_per_degree).image, a));
+  // From here a stop would leave some files and not others.
+  computing.reset();
+  stop_if_interrupted();
+  for (const Writer& write : writers) write();
   if (options.json) {
     fmt::print("{}\n", io::json_text(json, 2));
     return;
@@ -210,7 +225,10 @@ void add_compare(CLI::App& app) {
                     "HDR-FLIP too: FLIP's greatest over all exposures; takes several times as long");
   command->add_option("--hdr-flip-image", o->hdr_flip_image, "Write a grey PNG of HDR-FLIP")
       ->check(picture_of({".png"}));
-  command->callback([o] { compare(*o); });
+  command->callback([o] {
+    catch_interrupts();
+    compare(*o);
+  });
 }
 
 }  // namespace lumicut::tools

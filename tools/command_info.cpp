@@ -48,12 +48,27 @@ ordered_json presets(const lumicut_integrator_info& info) {
   return all;
 }
 
+// Those of this build.
+ordered_json accels(const io::Api& api) {
+  ordered_json names = ordered_json::array();
+  const io::Handle<lumicut_device> device = api::Device(api, 1);
+  for (const char* name : {"bvh", "embree"}) {
+    lumicut_scene_desc desc{};
+    desc.struct_size = sizeof(desc);
+    desc.accel = name;
+    io::Handle<lumicut_scene> scene(api);
+    if (api.scene_create(device.get(), &desc, scene.out()) == LUMICUT_OK) names.push_back(name);
+  }
+  return names;
+}
+
 ordered_json describe(const io::Library& library) {
   const io::Api& api = library.api();
   uint32_t major = 0, minor = 0;
   ordered_json all = {{"version", api.version(&major, &minor)}};
   all["abi"] = fmt::format("{}.{}", major, minor);
   all["library"] = library.path();
+  all["accels"] = accels(api);
   all["integrators"] = ordered_json::array();
   for (const auto& info : api::integrators(api))
     all["integrators"].push_back({{"id", info.id},
@@ -72,8 +87,15 @@ ordered_json describe(const io::Library& library) {
 
 std::string text(const ordered_json& value) { return value.get<std::string>(); }
 
+std::string listed(const ordered_json& names) {
+  std::string out;
+  for (const auto& name : names) out += (out.empty() ? "" : ", ") + text(name);
+  return out;
+}
+
 void print_text(const ordered_json& all) {
   fmt::print("lumicut {}, ABI {}, {}\n", text(all["version"]), text(all["abi"]), text(all["library"]));
+  fmt::print("rays: {}\n", listed(all["accels"]));
   for (const auto& integrator : all["integrators"]) {
     fmt::print("\n{}: {}\n  {}\n", text(integrator["id"]), text(integrator["description"]), text(integrator["source"]));
     for (const auto& [name, parameters] : integrator["presets"].items())
@@ -92,6 +114,13 @@ void print_text(const ordered_json& all) {
 }
 
 }  // namespace
+
+std::string version_text() {
+  const io::Library library;
+  uint32_t major = 0, minor = 0;
+  const char* version = library.api().version(&major, &minor);
+  return fmt::format("lumicut {}, ABI {}.{}\nrays: {}", version, major, minor, listed(accels(library.api())));
+}
 
 void add_info(CLI::App& app) {
   auto* command = app.add_subcommand("info", "Version, integrators and their parameters");

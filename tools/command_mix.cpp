@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <memory>
 
 #include "io/atomic_file.h"
 #include "io/file_error.h"
@@ -57,6 +58,7 @@ void mix(const Options& o) {
   for (const auto& text : o.gains)
     if (const auto [group, gain] = parse_gain(text); !gains.emplace(group, gain).second)
       throw UsageError(fmt::format("--gain {}: group {} is given twice", text, group));
+  auto computing = std::make_unique<NothingToLose>();
   const io::Image image = io::read_image(o.input);
   io::Image out = image;
   out.layers = {{"radiance", 3, std::vector<float>(size_t{3} * image.width * image.height, 0.0f)}};
@@ -81,6 +83,8 @@ void mix(const Options& o) {
     if (layer.name == "alpha" || layer.name == "depth" || layer.name == "normal" || layer.name == "albedo" ||
         layer.name == "position")
       out.layers.push_back(layer);
+  computing.reset();
+  stop_if_interrupted();
   if (!o.output.empty()) io::write_exr(o.output, out, o.half);
   if (!o.png.empty())
     write_exposed_png(o.png, {sum, static_cast<uint32_t>(out.width), static_cast<uint32_t>(out.height)}, o.exposure);
@@ -103,6 +107,9 @@ void add_mix(CLI::App& app) {
   command->callback([o] {
     if (o->output.empty() && o->png.empty()) throw UsageError("mix: nothing to write; give -o out.exr or --png");
     io::check_distinct({o->output, o->png}, {o->input});
+    for (const auto& path : {o->output, o->png})
+      if (!path.empty()) io::check_writable(path);
+    catch_interrupts();
     mix(*o);
   });
 }

@@ -234,19 +234,15 @@ class RenderCommand {
     };
     refuse(o_.squares > 0, "--squares"), refuse(!o_.vpl_in.empty(), "--vpl-in");
     refuse(o_.groups, "--groups");
-    io::SceneData of_beside = o_.verbosity >= 2 ? data : std::move(data);
-    const auto add = [&] {
+    if (!o_.checkpoint.empty() && o_.verbosity >= 1)
+      print_error("lumicut: warning: {}: keeps the passes of the whole scene; --resume renders the shadows anew\n",
+                  o_.checkpoint);
+    clear_behind_ = !shows_world(data);
+    for_each_beside(o_.verbosity >= 2 ? data : std::move(data), [&](const io::SceneData& scene) {
       beside_.emplace_back(api());
       create_scene(api(), o_, device_.get(), beside_.back());
-      io::upload_scene(api(), beside_.back().get(), of_beside);
-    };
-    const bool shows_world = of_beside.environment && (of_beside.environment->flags & LUMICUT_HIDDEN) == 0;
-    clear_behind_ = !shows_world;
-    const auto environment = of_beside.environment;
-    leave_objects(of_beside), add();
-    of_beside.environment = environment;
-    leave_catchers(of_beside), add();
-    if (shows_world) leave_world(of_beside), add();
+      io::upload_scene(api(), beside_.back().get(), scene);
+    });
   }
 
   // Frames of those, of as many passes as the whole one has.
@@ -654,6 +650,8 @@ void add_render(CLI::App& app) {
     if (o->squares > 0 &&
         (o->passes.value_or(1) > 1 || o->seconds > 0 || o->target_error > 0 || !o->checkpoint.empty()))
       throw UsageError("render: --squares renders one pass");
+    if (o->passes == 0u && o->seconds == 0 && o->target_error == 0)
+      throw UsageError("--passes 0: until --seconds or --target-error, of which neither is given");
     catch_interrupts();
     try {
       RenderCommand(*o).run();

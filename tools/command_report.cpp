@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "io/atomic_file.h"
@@ -265,6 +266,7 @@ void report(const Options& o) {
   if (output.empty()) output = (std::filesystem::path(o.results).parent_path() / "report.html").string();
   io::check_distinct({output}, {o.results});
   io::check_writable(output);
+  auto computing = std::make_unique<NothingToLose>();
   const auto results = io::parse_json<ordered_json>(io::read_whole_file(o.results), o.results);
   if (!results.is_object() || !results.contains("format") || results["format"] != "lumicut-bench/1")
     throw io::FileError(o.results, "is no result of `lumicut bench`: its \"format\" is not \"lumicut-bench/1\"");
@@ -274,6 +276,8 @@ void report(const Options& o) {
   } catch (const nlohmann::json::exception& error) {
     throw io::FileError(o.results, fmt::format("lacks what a report needs: {}", error.what()));
   }
+  computing.reset();
+  stop_if_interrupted();
   io::write_whole_file(output, html);
   fmt::print("{}: {:.1f} MB\n", output, static_cast<double>(html.size()) / 1e6);
 }
@@ -288,7 +292,10 @@ void add_report(CLI::App& app) {
   command->add_option("--max-size", o->most, "Largest side of a picture; bigger images are averaged down")
       ->capture_default_str()
       ->check(CLI::Range(16, 65536));
-  command->callback([o] { report(*o); });
+  command->callback([o] {
+    catch_interrupts();
+    report(*o);
+  });
 }
 
 }  // namespace lumicut::tools

@@ -74,4 +74,7 @@ void add_info(CLI::App& app);
 void add_check(CLI::App& app);
 void add_errors(CLI::App& app);
 
+// Of --version: the library's version, and what traces rays in it.
+std::string version_text();
+
 }  // namespace lumicut::tools

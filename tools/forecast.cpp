@@ -141,14 +141,25 @@ Forecast forecast(const io::Api& api, const RenderSetup& setup, lumicut_scene sc
   return f;
 }
 
+void add_shadows(Forecast& whole, const Forecast& beside) {
+  ++whole.shadow_scenes;
+  whole.seconds += beside.seconds, whole.prepare_seconds += beside.prepare_seconds;
+  whole.cpu_seconds += beside.cpu_seconds, whole.rays_per_pixel += beside.rays_per_pixel;
+  // One is rendered at a time; of those before, radiance, alpha and what is denoised stay.
+  const double kept = whole.pixels * 7 * sizeof(float) * whole.shadow_scenes;
+  whole.peak_bytes = std::max(whole.peak_bytes, beside.peak_bytes + kept);
+}
+
 std::string forecast_line(const Forecast& f) {
   const std::string passes = f.passes > 1 ? fmt::format("{:.0f} passes, ", f.passes) : "";
   const std::string disk =
       f.checkpoint_bytes > 0 ? fmt::format(", a checkpoint of {:.3g} MB", f.checkpoint_bytes / 1e6) : "";
+  const std::string shadows =
+      f.shadow_scenes > 0 ? fmt::format("with {:.0f} scenes more for shadow catchers, ", f.shadow_scenes) : "";
   return fmt::format(
-      "forecast: {}about {:.3g} s ({:.3g} s of them for {:.0f} virtual lights and their tree), {:.3g} CPU seconds, "
+      "forecast: {}{}about {:.3g} s ({:.3g} s of them for {:.0f} virtual lights and their tree), {:.3g} CPU seconds, "
       "{:.0f} shadow rays a pixel, {:.0f} MB{}; from {:.0f} of {:.0f} pixels",
-      passes, f.seconds, f.prepare_seconds, f.vpls, f.cpu_seconds, f.rays_per_pixel, f.peak_bytes / 1e6, disk,
+      passes, shadows, f.seconds, f.prepare_seconds, f.vpls, f.cpu_seconds, f.rays_per_pixel, f.peak_bytes / 1e6, disk,
       f.probed_pixels, f.pixels);
 }
 
@@ -160,6 +171,7 @@ nlohmann::ordered_json forecast_json(const Forecast& f) {
           {"peak_bytes", f.peak_bytes},
           {"checkpoint_bytes", f.checkpoint_bytes},
           {"passes", f.passes},
+          {"shadow_scenes", f.shadow_scenes},
           {"vpls", f.vpls},
           {"probed_pixels", f.probed_pixels},
           {"pixels", f.pixels}};

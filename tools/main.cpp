@@ -59,6 +59,7 @@ int run(int argc, char** argv, int& output_error) {
       "  lumicut report out/bench/results.json -o page.html   the same as a page\n");
   app.name("lumicut");
   app.require_subcommand(1);
+  app.set_version_flag("--version", version_text, "Print the version, and what can trace rays (--accel)");
   app.footer(
       "Exit codes: 0 done, 1 failed, 2 wrong command line, 3 a file is missing, wrong or cannot be written, 130 "
       "interrupted.");

@@ -8,6 +8,14 @@ bool has_catchers(const io::SceneData& data) {
   return std::ranges::any_of(data.meshes, [](const io::Mesh& mesh) { return mesh.shadow_catcher; });
 }
 
+bool shows_world(const io::SceneData& data) {
+  return data.environment && (data.environment->flags & LUMICUT_HIDDEN) == 0;
+}
+
+namespace {
+
+// Each changes `data`, so that nothing big is copied.
+
 // The second half of the materials is the first as holes to the camera.
 void leave_objects(io::SceneData& data) {
   const auto count = static_cast<uint32_t>(data.materials.size());
@@ -22,6 +30,7 @@ void leave_objects(io::SceneData& data) {
   if (data.environment) data.environment->flags |= LUMICUT_HIDDEN;
 }
 
+// Of what leave_objects left.
 void leave_catchers(io::SceneData& data) {
   const auto count = static_cast<uint32_t>(data.materials.size() / 2);
   std::erase_if(data.meshes, [](const io::Mesh& mesh) {
@@ -39,6 +48,17 @@ void leave_catchers(io::SceneData& data) {
 }
 
 void leave_world(io::SceneData& data) { data.meshes.clear(), data.lights.clear(), data.light_names.clear(); }
+
+}  // namespace
+
+void for_each_beside(io::SceneData data, const std::function<void(const io::SceneData&)>& use) {
+  const bool with_world = shows_world(data);
+  const auto environment = data.environment;
+  leave_objects(data), use(data);
+  data.environment = environment;
+  leave_catchers(data), use(data);
+  if (with_world) leave_world(data), use(data);
+}
 
 namespace {
 

@@ -4,6 +4,7 @@
 // sees it. [export_scripts/lumicut_blender/shadow_catcher.py does the same in Blender]
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -13,10 +14,9 @@ namespace lumicut::tools {
 
 bool has_catchers(const io::SceneData& data);
 
-// Scenes beside the whole one are made one after the other: each changes `data`, so that nothing big is copied.
-void leave_objects(io::SceneData& data);   // of the whole
-void leave_catchers(io::SceneData& data);  // of that
-void leave_world(io::SceneData& data);     // of any
+bool shows_world(const io::SceneData& data);
+// Calls `use` for each scene beside the whole one, `data`: objects, catchers, and where it is seen the world.
+void for_each_beside(io::SceneData data, const std::function<void(const io::SceneData&)>& use);
 
 // Pixels of a frame: three numbers of radiance each, one of alpha.
 struct Caught {

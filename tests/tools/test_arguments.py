@@ -8,7 +8,7 @@ import threading
 import time
 import unittest
 
-from cli import BAD_FILE, COMMAND, INTERRUPTED, OK, SCENE, USAGE, Cli, lumicut, wait_until_caught
+from cli import BAD_FILE, COMMAND, INTERRUPTED, OK, SCENE, USAGE, Cli, lumicut, wait_until_caught, write_exr
 
 SMALL = ["render", SCENE, "--size", "16x12", "--vpls", "50", "-q"]
 
@@ -179,6 +179,48 @@ class Arguments(Cli):
         self.assert_ends(lumicut(*SMALL, "--checkpoint", kept, "--resume", "-o", self.folder / "a.exr"), BAD_FILE, str(kept))
         self.assert_ends(lumicut(*SMALL, "--checkpoint", kept, "-o", self.folder / "a.exr"), OK)
         self.assert_ends(lumicut("render", self.scene(), "-q", "--checkpoint", kept, "--resume", "-o", self.folder / "b.exr"), BAD_FILE, str(kept))
+
+    def test_no_passes_without_another_end_are_refused(self):
+        self.refused(USAGE, *SMALL, "--passes", "0", "-o", self.folder / "a.exr", says="--passes 0: until --seconds or --target-error")
+        self.assert_ends(lumicut(*SMALL, "--passes", "0", "--seconds", "0.1", "-o", self.folder / "a.exr"), OK)
+
+    def test_the_version_names_what_traces_rays(self):
+        said = lumicut("--version")
+        self.assert_ends(said, OK)
+        self.assertRegex(said.stdout, r"^lumicut \d+\.\d+\.\d+, ABI \d+\.\d+\nrays: bvh(, embree)?\n$")
+        self.assertIn(said.stdout.splitlines()[1], lumicut("info").stdout)
+
+    def test_json_of_other_encodings_or_with_zero_bytes_is_refused(self):
+        text = self.scene().read_text()
+        for bad, says in ((text.encode() + b"\0\0", f"line 1, column {len(text) + 1}: not JSON: a zero byte"), (b"{}\n{\0", "line 2, column 2"),
+                          *((text.encode(name), "is UTF-16 text; save it as UTF-8") for name in ("utf-16", "utf-16-le", "utf-16-be"))):
+            (self.folder / "bad.json").write_bytes(bad)
+            self.refused(BAD_FILE, "check", self.folder / "bad.json", says=says)
+        self.refused(BAD_FILE, "check", self.scene(environment={"skies": {}, "colour": 1}), says="environment")
+        said = lumicut("check", self.scene(environment={"zzzzzzzz": 1})).stderr
+        self.assertEqual(said.count("sky"), 1, said)
+
+    def test_ctrl_c_ends_what_only_computes(self):
+        # Rows of a small image many times over: reading them takes a good part of a second.
+        small, wide, side = self.folder / "small.exr", self.folder / "wide.exr", 4000
+        write_exr(small, side, 1, lambda x, y: (0.5, 0.5, 0.5))
+        window = struct.pack("<4i", 0, 0, side - 1, 0)
+        header, row = small.read_bytes().split(struct.pack("<ii", 0, 6 * side))
+        header = header[:-8].replace(window, struct.pack("<4i", 0, 0, side - 1, side - 1))
+        first = len(header) + 8 * side
+        table = b"".join(struct.pack("<Q", first + y * (8 + len(row))) for y in range(side))
+        wide.write_bytes(header + table + b"".join(struct.pack("<ii", y, len(row)) + row for y in range(side)))
+        outputs = [self.folder / name for name in ("a.png", "b.exr", "c.exr")]
+        self.refused(BAD_FILE, "mix", wide, "-o", outputs[2], says="has no layers radiance.GROUP")
+        for number in (signal.SIGINT, signal.SIGTERM):
+            for command in (["compare", wide, wide, "--hdr-flip", "--flip-image", outputs[0], "--error-map", outputs[1]], ["mix", wide, "-o", outputs[2]]):
+                process = subprocess.Popen([COMMAND, *map(str, command)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+                wait_until_caught(process, number)
+                process.send_signal(number)
+                said = process.communicate(timeout=60)[1]
+                self.assertEqual(process.returncode, INTERRUPTED, said)
+                self.assertIn("interrupted; nothing was written", said)
+        self.assertFalse(any(path.exists() for path in outputs))
 
     def test_ctrl_c_ends_the_reading_of_files_at_once(self):
         (self.folder / "big.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * 6000000)

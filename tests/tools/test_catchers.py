@@ -85,6 +85,32 @@ class Catchers(cli.Cli):
         self.assertIn("--vpl-in: not with shadow catchers", self.render("--vpl-in", self.folder / "a.vpl", code=USAGE))
         self.assertIn("shows no shadow where no light", self.render("--strict", sun=False, code=BAD_FILE))
 
+    def test_check_foretells_all_scenes_that_they_take(self):
+        self.render(lit=0, color=[1, 1, 1])
+        scene = json.loads((self.folder / "scene.json").read_text())
+        del scene["meshes"][0]["shadow_catcher"]
+        (self.folder / "plain.json").write_text(json.dumps(scene))
+        caught, plain = (json.loads(lumicut("check", "--json", self.folder / name, "-i", "exhaustive", "--vpls", 100).stdout)["forecast"] for name in ("scene.json", "plain.json"))
+        self.assertEqual((caught["shadow_scenes"], plain["shadow_scenes"]), (3, 0))
+        # The floor is looked at twice, and so is the roof.
+        self.assertGreater(caught["rays_per_pixel"], 1.5 * plain["rays_per_pixel"])
+        self.assertIn("with 3 scenes more for shadow catchers", lumicut("check", self.folder / "scene.json").stdout)
+        self.assert_ends(lumicut("check", "--groups", self.folder / "scene.json"), USAGE, "--groups: not with shadow catchers")
+
+    def test_a_checkpoint_is_said_to_keep_the_whole_scene_alone(self):
+        kept = self.folder / "kept"
+        whole = self.render("--passes", "3", lit=0.5)
+        self.assertEqual(abs(whole - self.render("--passes", "3", "--checkpoint", kept, lit=0.5)).max(), 0)
+        self.assertEqual(abs(whole - self.render("--passes", "3", "--checkpoint", kept, "--resume", lit=0.5)).max(), 0)
+        result = lumicut("render", self.folder / "scene.json", "-i", "exhaustive", "--checkpoint", kept, "-o", self.folder / "out.exr")
+        self.assertIn("kept: keeps the passes of the whole scene; --resume renders the shadows anew", result.stderr)
+
+    def test_check_says_nothing_else_is_suspicious_where_something_is(self):
+        self.render(lit=0.5, sun=False)
+        said = lumicut("check", "--no-forecast", self.folder / "scene.json").stdout
+        self.assertIn("shows no shadow", said)
+        self.assertIn("nothing else suspicious", said)
+
     def test_other_commands_say_that_they_take_them_for_objects(self):
         self.render(lit=0)
         cameras = self.folder / "cameras.json"
