@@ -204,6 +204,7 @@ class SceneReader {
       angles("latitude", camera.latitude, 90);
       return;
     }
+    if (camera.panorama == LUMICUT_MIRROR_BALL || camera.panorama == LUMICUT_EQUIANGULAR_CUBE) return;
     camera.fisheye_fov = static_cast<float>(radians(object.need("fov").number(0.1, 360)));
     if (camera.panorama == LUMICUT_FISHEYE_EQUIDISTANT) return;
     camera.fisheye_lens = static_cast<float>(object.need("lens").number(1e-6, 1e6));
@@ -215,10 +216,11 @@ class SceneReader {
     JsonObject object(value);
     lumicut_camera& camera = scene_.camera;
     camera.struct_size = sizeof(camera);
-    const size_t type = object.has("type")
-                            ? object.need("type").choice({"perspective", "orthographic", "equirectangular",
-                                                          "fisheye_equidistant", "fisheye_equisolid"})
-                            : 0;
+    const size_t type =
+        object.has("type")
+            ? object.need("type").choice({"perspective", "orthographic", "equirectangular", "fisheye_equidistant",
+                                          "fisheye_equisolid", "mirror_ball", "equiangular_cube"})
+            : 0;
     camera.orthographic = type == 1;
     camera.panorama = type < 2 ? 0 : static_cast<uint32_t>(type - 1);
     Matrix m{};
@@ -250,9 +252,7 @@ class SceneReader {
     } else {
       camera.fov_y = static_cast<float>(radians(object.need("fov_y").number(0.01, 179.0)));
     }
-    if (camera.panorama != 0) {
-      // All around there is no lens to shift or to open.
-    } else if (auto shift = object.find("shift")) {
+    if (auto shift = object.find("shift")) {
       const auto s = shift->numbers(2, -100, 100);
       camera.shift[0] = static_cast<float>(s[0]), camera.shift[1] = static_cast<float>(s[1]);
     }

@@ -337,10 +337,13 @@ class Writer {
 
   Json panorama(Json out) const {
     const lumicut_camera& c = scene_.camera;
-    constexpr const char* kTypes[] = {"equirectangular", "fisheye_equidistant", "fisheye_equisolid"};
+    constexpr const char* kTypes[] = {"equirectangular", "fisheye_equidistant", "fisheye_equisolid", "mirror_ball",
+                                      "equiangular_cube"};
     out["type"] = kTypes[c.panorama - 1];
     if (c.near_clip != 0) out["near"] = double{c.near_clip};
     if (c.far_clip != 0) out["far"] = double{c.far_clip};
+    if (c.shift[0] != 0 || c.shift[1] != 0) out["shift"] = numbers(c.shift, 2);
+    if (c.panorama == LUMICUT_MIRROR_BALL || c.panorama == LUMICUT_EQUIANGULAR_CUBE) return out;
     if (c.panorama == LUMICUT_EQUIRECTANGULAR) {
       out["longitude"] = {degrees(c.longitude[0]), degrees(c.longitude[1])};
       out["latitude"] = {degrees(c.latitude[0]), degrees(c.latitude[1])};

@@ -390,6 +390,7 @@ void read_panorama(const FieldValidator& c, const lumicut_camera& in, Camera& ca
     }
     return;
   }
+  if (in.panorama == LUMICUT_MIRROR_BALL || in.panorama == LUMICUT_EQUIANGULAR_CUBE) return;
   c.range("fisheye_fov", in.fisheye_fov, kMinAngle, 2.0f * kPi + 1e-5f);
   camera.fisheye_fov = in.fisheye_fov;
   if (in.panorama == LUMICUT_FISHEYE_EQUIDISTANT) return;
@@ -403,7 +404,7 @@ void read_panorama(const FieldValidator& c, const lumicut_camera& in, Camera& ca
 Camera to_camera(const lumicut_camera& in) {
   const FieldValidator c("lumicut_camera");
   c.integer("orthographic", in.orthographic, 0, 1);
-  c.integer("panorama", in.panorama, 0, LUMICUT_FISHEYE_EQUISOLID);
+  c.integer("panorama", in.panorama, 0, LUMICUT_EQUIANGULAR_CUBE);
   if (in.orthographic != 0 && in.panorama != 0) c.fail("panorama", "is not 0, but orthographic is not either");
   for (int k = 0; k < 12; ++k) c.finite("to_world", in.to_world[k], k);
   for (const int k : {3, 7, 11}) c.coordinate("to_world", in.to_world[k], k);

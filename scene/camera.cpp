@@ -2,13 +2,27 @@
 
 namespace lumicut {
 
-// u from left to right, v from below to above, both in [0,1]. [the projections of Cycles, which follow Paul Bourke's]
+// u from left to right, v from below to above, both in [0,1] without a shift. [the projections of Cycles, which follow Paul Bourke's]
 Camera::Sample Camera::panoramic(float u, float v) const {
   Sample s{position, forward, near_clip, far_clip, 1.0f};
   if (panorama == Panorama::equirectangular) {
     const float phi = longitude[0] + (longitude[1] - longitude[0]) * u;
     const float theta = latitude[0] + (latitude[1] - latitude[0]) * v;
     s.direction = (forward * std::cos(phi) + right * std::sin(phi)) * std::cos(theta) + up * std::sin(theta);
+    return s;
+  }
+  if (panorama == Panorama::equiangular_cube) {
+    constexpr float kQuarterTurn = 1.57079633f;
+    s.direction =
+        normalize(forward + right * std::tan((u - 0.5f) * kQuarterTurn) + up * std::tan((v - 0.5f) * kQuarterTurn));
+    return s;
+  }
+  if (panorama == Panorama::mirror_ball) {
+    // forward mirrored at a ball's normal, turned round
+    const float x = 2.0f * u - 1.0f, y = 2.0f * v - 1.0f, cosine2 = 1.0f - x * x - y * y;
+    s.outside = cosine2 < 0.0f;
+    const float cosine = std::sqrt(std::max(0.0f, cosine2));
+    s.direction = (forward * cosine + right * x + up * y) * (2.0f * cosine) - forward;
     return s;
   }
   const bool equisolid = panorama == Panorama::fisheye_equisolid;
@@ -26,7 +40,7 @@ Camera::Sample Camera::panoramic(float u, float v) const {
 }
 
 Camera::Sample Camera::generate(float x, float y, float width, float height_px, float lens_u, float lens_v) const {
-  if (panorama != Panorama::none) return panoramic(x / width, 1.0f - y / height_px);
+  if (panorama != Panorama::none) return panoramic(x / width + shift_x, 1.0f - y / height_px + shift_y);
   // Image plane in units of the image's height, centre 0, y up.
   const float sx = (x - 0.5f * width) * pixel_aspect / height_px + shift_x;
   const float sy = 0.5f - y / height_px + shift_y;

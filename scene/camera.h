@@ -14,11 +14,18 @@ struct Camera {
   Vec3f position{}, right{1, 0, 0}, up{0, 1, 0}, forward{0, 0, -1};  // orthonormal
   float tan_half_fov_y = 0.5f;                                       // perspective
   float height = 2.0f;                                               // orthographic: world height of the image
-  float shift_x = 0.0f, shift_y = 0.0f;
+  float shift_x = 0.0f, shift_y = 0.0f;                              // in heights; of panoramas in widths and heights
   float near_clip = 0.0f, far_clip = std::numeric_limits<float>::infinity();
   float pixel_aspect = 1.0f;
   float lens_radius = 0.0f, focus_distance = 1.0f;
-  enum class Panorama : uint32_t { none = 0, equirectangular = 1, fisheye_equidistant = 2, fisheye_equisolid = 3 };
+  enum class Panorama : uint32_t {
+    none = 0,
+    equirectangular = 1,
+    fisheye_equidistant = 2,
+    fisheye_equisolid = 3,
+    mirror_ball = 4,
+    equiangular_cube = 5  // a face of it
+  };
   Panorama panorama = Panorama::none;
   float fisheye_fov = 3.14159265f, fisheye_lens = 1.0f;  // radians; in units of the sensor
   float sensor_width = 1.0f, sensor_height = 1.0f;

@@ -63,7 +63,7 @@ def fit(render, camera_data):
     return horizontal, camera_data.sensor_height if mode == "VERTICAL" else camera_data.sensor_width, width, height
 
 
-def set_panorama(out, camera, aspect, report):
+def set_panorama(out, camera, aspect, shift_x, report):
     """Makes `out` the panorama of a camera; False where there is none of its kind. `aspect`: of the image."""
     data = camera.data
     own = data if hasattr(data, "panorama_type") else data.cycles  # Blender 4.3 and later: its own
@@ -83,13 +83,14 @@ def set_panorama(out, camera, aspect, report):
         else:
             side = data.sensor_height if data.sensor_fit == "VERTICAL" else data.sensor_width
             out.sensor[:] = [side * aspect, side]
+    elif kind in {"MIRRORBALL", "EQUIANGULAR_CUBEMAP_FACE"}:
+        out.panorama = library.MIRROR_BALL if kind == "MIRRORBALL" else library.EQUIANGULAR_CUBE
     else:
         report.note(f"{camera.name} ({kind.replace('_', ' ').title()})", "Panoramas taken as perspective ones")
         return False
     if data.dof.use_dof:
         report.note(camera.name, "Depth of field of panoramas left out")
-    if data.shift_x or data.shift_y:
-        report.note(camera.name, "Lens shift of panoramas left out")
+    out.shift[:] = [shift_x, data.shift_y]
     return True
 
 
@@ -115,7 +116,7 @@ def convert_camera(camera, scene, report, matrix=None, shift_x=None):
     out.pixel_aspect = scene.render.pixel_aspect_x / scene.render.pixel_aspect_y
     out.shift[:] = [shift_x * heights, data.shift_y * heights]
     out.near_clip, out.far_clip = data.clip_start, data.clip_end
-    if data.type == "PANO" and set_panorama(out, camera, width / height, report):
+    if data.type == "PANO" and set_panorama(out, camera, width / height, shift_x, report):
         return out
     if data.type == "ORTHO":
         out.orthographic = 1
@@ -138,7 +139,7 @@ def convert_camera(camera, scene, report, matrix=None, shift_x=None):
 
 def on_film(camera, width, height, places):
     """Where a library.Camera of an image of width x height pixels sees places (n, 3): pixels to the right and up from a place
-    of its own. None for fisheyes."""
+    of its own. None for other panoramas than equirectangular ones."""
     axes = np.array(camera.to_world[:], np.float64).reshape(3, 4)
     x, y, z = ((places - axes[:, 3]) @ axes[:, :3]).T
     if camera.panorama == library.EQUIRECTANGULAR:

@@ -354,6 +354,8 @@ class Collector:
             self.scene.environment.flags |= library.HIDDEN
         if scene.render.use_motion_blur:
             self.report.note(scene.name, "Motion blur left out")
+        if self.scene.transparent and getattr(getattr(scene, "cycles", None), "film_transparent_glass", False):
+            self.report.note(scene.name, "Transparent glass of the film left out: what is seen through glass is opaque")
         if scene.render.use_freestyle:
             self.report.note(scene.name, "Freestyle lines left out")
         if any(mesh.catcher for mesh in self.scene.meshes):

@@ -318,8 +318,12 @@ class Writer:
 
     @staticmethod
     def panorama(c):
-        kind = ("equirectangular", "fisheye_equidistant", "fisheye_equisolid")[c.panorama - 1]
+        kind = ("equirectangular", "fisheye_equidistant", "fisheye_equisolid", "mirror_ball", "equiangular_cube")[c.panorama - 1]
         out = {"type": kind, "matrix": numbers(c.to_world), "near": numbers([c.near_clip])[0], "far": numbers([c.far_clip])[0]}
+        if any(c.shift):
+            out["shift"] = numbers(c.shift)
+        if c.panorama in {library.MIRROR_BALL, library.EQUIANGULAR_CUBE}:
+            return out
         if c.panorama == library.EQUIRECTANGULAR:
             return out | {"longitude": [max(-180.0, min(180.0, degrees(a))) for a in c.longitude],
                           "latitude": [max(-90.0, min(90.0, degrees(a))) for a in c.latitude]}

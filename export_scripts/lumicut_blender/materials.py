@@ -684,6 +684,8 @@ class Materials:
                     if slot == "opacity" and (ray == "shadow" or not surface.by_ray) and np.ptp(linear - linear[:, ::-1]) > 1e-3:
                         self.report.note(name, "Holes on one side, which to light are as from the front")
                     value = Value(value.factor, ProgramPicture(name, of_picture(value.picture)))
+            if slot == "emission" and (value.mean() < -1e-3).any():
+                self.report.note(name, "Emission below 0 left out")
             factors[slot] = np.maximum(np.nan_to_num(value.factor), 0)
             if value.picture is not None:
                 pictures[slot] = value.picture

@@ -45,12 +45,20 @@ class Backdrop:
 
 def panoramic(camera, axes, u, v):
     """(h, w, 3) directions of a panorama, as scene/camera.cpp has them; beyond a fisheye's edge those of the edge."""
-    u, v = u[None, :], v[:, None]
+    u, v = u[None, :] + camera.shift[0], v[:, None] + camera.shift[1]
     if camera.panorama == library.EQUIRECTANGULAR:
         west, east = camera.longitude
         low, high = camera.latitude
         along, up = west + (east - west) * u, low + (high - low) * v
         ahead, right, up = np.cos(along) * np.cos(up), np.sin(along) * np.cos(up), np.sin(up) + 0 * u
+    elif camera.panorama == library.EQUIANGULAR_CUBE:
+        right, up = np.tan((u - 0.5) * np.pi / 2) + 0 * v, np.tan((v - 0.5) * np.pi / 2) + 0 * u
+        length = np.sqrt(1 + right ** 2 + up ** 2)
+        ahead, right, up = 1 / length, right / length, up / length
+    elif camera.panorama == library.MIRROR_BALL:
+        x, y = 2 * u - 1 + 0 * v, 2 * v - 1 + 0 * u
+        cosine = np.sqrt(np.maximum(0, 1 - x ** 2 - y ** 2))
+        ahead, right, up = 2 * cosine ** 2 - 1, 2 * cosine * x, 2 * cosine * y
     else:
         equisolid = camera.panorama == library.FISHEYE_EQUISOLID
         x, y = (u - 0.5) * (camera.sensor[0] if equisolid else 2), (v - 0.5) * (camera.sensor[1] if equisolid else 2)

@@ -788,6 +788,19 @@ class MaterialTrees(unittest.TestCase):
             self.assertIn(words, text)
         self.assertEqual(len(notes), len(set(notes)), "each once")
 
+    def test_emission_below_0_and_transparent_glass_of_films_are_named(self):
+        m = h.material("Dark")
+        h.shader(m, "ShaderNodeEmission", Strength=-1.0)
+        h.add_plane(material=m)
+        scene = bpy.context.scene
+        scene.render.film_transparent = scene.cycles.film_transparent_glass = True
+        with h.quiet():
+            h.set_lumicut(vpls=10)
+            h.render()
+        text = "\n".join(h.last_notes())
+        self.assertIn("Emission below 0 left out: Dark", text)
+        self.assertIn("Transparent glass of the film left out", text)
+
     def test_missing_images_and_loops_do_not_stop_a_render(self):
         m, node, texture = self.with_image(None)
         missing = bpy.data.images.new("gone", 1, 1)

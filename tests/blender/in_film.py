@@ -57,15 +57,26 @@ class Panoramas(unittest.TestCase):
         self.compare((32, 48), **of_sensor)
         self.compare((48, 32), (("sensor_fit", "VERTICAL"), ("sensor_height", 20)), **of_sensor)
 
+    def test_mirror_ball(self):
+        self.compare((48, 48), panorama_type="MIRRORBALL")
+
+    def test_equiangular_cube_face(self):
+        self.compare((48, 48), panorama_type="EQUIANGULAR_CUBEMAP_FACE")
+
+    def test_lens_shift(self):
+        shift = (("shift_x", 0.1), ("shift_y", -0.15))
+        self.compare((64, 32), shift, panorama_type="EQUIRECTANGULAR")
+        self.compare((32, 48), shift, panorama_type="FISHEYE_EQUISOLID", fisheye_fov=3.0, fisheye_lens=10.5)
+
     def test_others_are_listed(self):
         scene = h.new_scene(8, 8)
         data = scene.camera.data
         data.type = "PANO"
-        (data if hasattr(data, "panorama_type") else data.cycles).panorama_type = "MIRRORBALL"
+        (data if hasattr(data, "panorama_type") else data.cycles).panorama_type = "FISHEYE_LENS_POLYNOMIAL"
         with h.quiet():
             h.set_lumicut(vpls=10)
             h.render()
-        self.assertIn("Panoramas taken as perspective ones: Camera (Mirrorball)", h.last_notes())
+        self.assertIn("Panoramas taken as perspective ones: Camera (Fisheye Lens Polynomial)", h.last_notes())
 
 
 class Filters(unittest.TestCase):

@@ -96,6 +96,11 @@ TEST(SceneJson, PanoramasHaveTheirAngles) {
   EXPECT_NEAR(c.fisheye_fov, M_PI, 1e-6);
   EXPECT_EQ(c.fisheye_lens, 10.5f);
   EXPECT_EQ(c.sensor[0], 36.0f);
+  for (const char* key : {"fov", "lens", "sensor"}) scene["camera"].erase(key);
+  scene["camera"]["type"] = "mirror_ball", scene["camera"]["shift"] = {0.25, -1};
+  c = read_scene(folder.write("scene.json", scene.dump())).camera;
+  EXPECT_EQ(c.panorama, uint32_t{LUMICUT_MIRROR_BALL});
+  EXPECT_EQ(c.shift[0], 0.25f);
 }
 
 TEST(SceneJson, LampsMayFaceWhatTheyLightAndCastNoShadows) {

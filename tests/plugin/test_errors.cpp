@@ -325,7 +325,7 @@ TEST(Errors, FieldsOfMeshesTexturesCamerasAndEnvironmentsAreCheckedByNameAndValu
   refused_camera([](auto& c) { c.near_clip = 2, c.far_clip = 1; },
                  "lumicut_camera.far_clip: 1 is not beyond near_clip 2");
   refused_camera([](auto& c) { c.lens_radius = 1; }, "lumicut_camera.focus_distance: 0");
-  refused_camera([](auto& c) { c.panorama = 4; }, "lumicut_camera.panorama: 4");
+  refused_camera([](auto& c) { c.panorama = 6; }, "lumicut_camera.panorama: 6");
   refused_camera([](auto& c) { c.panorama = LUMICUT_EQUIRECTANGULAR, c.orthographic = 1; }, "lumicut_camera.panorama");
   refused_camera([](auto& c) { c.panorama = LUMICUT_EQUIRECTANGULAR, c.latitude[1] = 2; },
                  "lumicut_camera.latitude[1]: 2");

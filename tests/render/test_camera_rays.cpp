@@ -41,6 +41,41 @@ TEST(Camera, FisheyesGrowWithTheAngleAndWithTheSineOfItsHalf) {
   }
 }
 
+TEST(Camera, MirrorBallsShowTheReflectionsOfABall) {
+  Camera c;
+  c.panorama = Camera::Panorama::mirror_ball;
+  for (const float r : {0.0f, 0.3f, 0.9f}) {
+    const Camera::Sample s = c.generate(100 + 80 * r, 50 - 30 * r, 200, 100, 0, 0);  // an ellipse
+    const float x = 0.8f * r, y = 0.6f * r;
+    const Vec3f normal = c.right * x + c.up * y - c.forward * std::sqrt(1 - r * r);
+    // The ball's reflection of what looks along `forward`, mirrored front to back.
+    Vec3f seen = c.forward - normal * (2 * dot(c.forward, normal));
+    seen = seen - c.forward * (2 * dot(seen, c.forward));
+    EXPECT_NEAR(length(s.direction - seen), 0.0f, 1e-5f) << r;
+    EXPECT_FALSE(s.outside);
+  }
+  EXPECT_TRUE(c.generate(5, 5, 200, 100, 0, 0).outside);
+}
+
+TEST(Camera, FacesOfEquiangularCubesHaveEvenAngles) {
+  Camera c;
+  c.panorama = Camera::Panorama::equiangular_cube;
+  for (const float share : {-1.0f, -0.5f, 0.0f, 0.25f}) {
+    const Vec3f d = c.generate(50 + 50 * share, 50, 100, 100, 0, 0).direction;
+    EXPECT_NEAR(std::atan2(dot(d, c.right), dot(d, c.forward)), share * kPi / 4, 1e-5f);
+    EXPECT_NEAR(dot(d, c.up), 0.0f, 1e-6f);
+  }
+}
+
+TEST(Camera, PanoramasShiftByWidthsAndHeights) {
+  Camera c, shifted;
+  c.panorama = shifted.panorama = Camera::Panorama::equirectangular;
+  shifted.shift_x = 0.1f, shifted.shift_y = 0.2f;
+  EXPECT_NEAR(
+      length(shifted.generate(80, 60, 200, 100, 0, 0).direction - c.generate(100, 40, 200, 100, 0, 0).direction), 0.0f,
+      1e-5f);
+}
+
 TEST(PixelFilter, OffsetsAreDistributedAsTheFilterSays) {
   for (const auto kind : {PixelFilter::Kind::box, PixelFilter::Kind::gaussian, PixelFilter::Kind::blackman_harris})
     for (const float width : {1.0f, 1.5f, 4.0f}) {

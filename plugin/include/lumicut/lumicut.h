@@ -236,19 +236,21 @@ typedef struct lumicut_camera {
   float to_world[12];   /* looks along -z, +y up, +x right; scale is ignored */
   float fov_y;          /* perspective: vertical opening angle of the whole image */
   float height;         /* orthographic: height of the image in the world */
-  float shift[2];       /* lens shift, in image heights, right and up */
+  float shift[2];       /* lens shift, right and up, in image heights; of panoramas in widths and heights */
   float near_clip, far_clip; /* along the ray's forward axis; far 0: infinity */
   float pixel_aspect;   /* width/height of a pixel; 0: 1 */
   float lens_radius;    /* depth of field; 0: pinhole */
   float focus_distance; /* along the forward axis */
-  uint32_t panorama;    /* LUMICUT_EQUIRECTANGULAR ...: all around, in place of fov_y; 0: none. Without shift and lens_radius */
+  uint32_t panorama;    /* LUMICUT_EQUIRECTANGULAR ...: all around, in place of fov_y; 0: none. Without lens_radius */
   float fisheye_fov;    /* opening angle, up to 2 pi; beyond it nothing is seen, alpha is 0 */
   float fisheye_lens;   /* equisolid: focal length, in units of sensor */
   float sensor[2];      /* equisolid: width and height of the image on it */
   float longitude[2], latitude[2]; /* equirectangular: from left to right within +-pi, from below to above within +-pi/2; all 0: whole */
 } lumicut_camera;
-/* Fisheyes are round in a square image, and an ellipse in others (equidistant), or cut by the sensor (equisolid). */
-enum { LUMICUT_EQUIRECTANGULAR = 1, LUMICUT_FISHEYE_EQUIDISTANT = 2, LUMICUT_FISHEYE_EQUISOLID = 3 };
+/* Fisheyes are round in a square image, and an ellipse in others (equidistant), or cut by the sensor (equisolid). A mirror
+   ball shows all directions as its reflections, seen from afar; a face of an equiangular cube a quarter turn each way. */
+enum { LUMICUT_EQUIRECTANGULAR = 1, LUMICUT_FISHEYE_EQUIDISTANT = 2, LUMICUT_FISHEYE_EQUISOLID = 3, LUMICUT_MIRROR_BALL = 4,
+       LUMICUT_EQUIANGULAR_CUBE = 5 };
 
 LUMICUT_API lumicut_result lumicut_scene_create(lumicut_device device, const lumicut_scene_desc* desc, lumicut_scene* scene); /* [any] desc NULL: defaults */
 /* All setters are [object], replace what was set, and take effect at the next commit. */
