@@ -21,6 +21,9 @@ class Document {
   Document(const nlohmann::json& json, const std::string& path) : top_(JsonValue(json, path, "")), path_(path) {}
 
   void check() const {
+    if (const auto asset = object(top_, "asset"))
+      if (const auto version = JsonObject(*asset).find("version"); version && !version->text().starts_with("2."))
+        version->fail(fmt::format("is {}, but 2 is read", version->text()));
     check_files("buffers");
     check_files("images");
     for (const auto& value : list(top_, "bufferViews")) index(JsonObject(value), "buffer", "buffers");
@@ -52,8 +55,8 @@ class Document {
   static void number(JsonObject from, const char* key, double least = -kAny, double most = kAny) {
     if (const auto found = from.find(key)) found->number(least, most);
   }
-  static void numbers(JsonObject from, const char* key, size_t count, double least = -kAny) {
-    if (const auto found = from.find(key)) found->numbers(count, least);
+  static void numbers(JsonObject from, const char* key, size_t count, double least = -kAny, double most = kAny) {
+    if (const auto found = from.find(key)) found->numbers(count, least, most);
   }
   size_t count(const char* of) const {
     const auto& all = top_.value().raw();
@@ -111,6 +114,7 @@ class Document {
     }
     numbers(material, "emissiveFactor", 3);
     number(material, "alphaCutoff");
+    if (auto mode = JsonObject(material).find("alphaMode")) mode->choice({"OPAQUE", "MASK", "BLEND"});
     check_texture(material, "normalTexture");
     check_texture(material, "emissiveTexture");
     const auto extensions = object(material, "extensions");
@@ -118,24 +122,25 @@ class Document {
     static const struct {
       const char *extension, *key;
       size_t numbers;  // 1: a lone number, 0: a texture
-    } kValues[] = {{"KHR_materials_emissive_strength", "emissiveStrength", 1},
+      double least = -kAny, most = kAny;
+    } kValues[] = {{"KHR_materials_emissive_strength", "emissiveStrength", 1, 0},
                    {"KHR_materials_transmission", "transmissionFactor", 1},
                    {"KHR_materials_ior", "ior", 1},
                    {"KHR_materials_clearcoat", "clearcoatFactor", 1},
                    {"KHR_materials_clearcoat", "clearcoatRoughnessFactor", 1},
-                   {"KHR_materials_specular", "specularFactor", 1},
-                   {"KHR_materials_specular", "specularColorFactor", 3},
-                   {"KHR_materials_volume", "thicknessFactor", 1},
-                   {"KHR_materials_volume", "attenuationDistance", 1},
-                   {"KHR_materials_volume", "attenuationColor", 3},
-                   {"KHR_materials_pbrSpecularGlossiness", "diffuseFactor", 4},
-                   {"KHR_materials_pbrSpecularGlossiness", "specularFactor", 3},
-                   {"KHR_materials_pbrSpecularGlossiness", "glossinessFactor", 1},
+                   {"KHR_materials_specular", "specularFactor", 1, 0, 1},
+                   {"KHR_materials_specular", "specularColorFactor", 3, 0},
+                   {"KHR_materials_volume", "thicknessFactor", 1, 0},
+                   {"KHR_materials_volume", "attenuationDistance", 1, 1e-30},
+                   {"KHR_materials_volume", "attenuationColor", 3, 0, 1},
+                   {"KHR_materials_pbrSpecularGlossiness", "diffuseFactor", 4, 0, 1},
+                   {"KHR_materials_pbrSpecularGlossiness", "specularFactor", 3, 0, 1},
+                   {"KHR_materials_pbrSpecularGlossiness", "glossinessFactor", 1, 0, 1},
                    {"KHR_materials_pbrSpecularGlossiness", "diffuseTexture", 0}};
     for (const auto& value : kValues)
       if (const auto extension = object(*extensions, value.extension)) {
-        if (value.numbers > 1) numbers(*extension, value.key, value.numbers);
-        if (value.numbers == 1) number(*extension, value.key);
+        if (value.numbers > 1) numbers(*extension, value.key, value.numbers, value.least, value.most);
+        if (value.numbers == 1) number(*extension, value.key, value.least, value.most);
         if (value.numbers == 0) check_texture(*extension, value.key);
       }
   }
@@ -164,7 +169,11 @@ class Document {
           if (const auto light = JsonObject(*punctual).find("light")) index(*light, lights, "lights");
         if (const auto instancing = object(*extensions, "EXT_mesh_gpu_instancing")) check_accessors(*instancing);
       }
-      numbers(node, "matrix", 16);
+      if (const auto matrix = node.find("matrix")) {
+        const auto m = matrix->numbers(16, -kAny, kAny);
+        if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1)
+          matrix->fail("is not affine: its last row is no 0 0 0 1");
+      }
       numbers(node, "translation", 3);
       numbers(node, "scale", 3);
       if (const auto rotation = node.find("rotation")) {
@@ -227,7 +236,9 @@ void check_gltf_document(const std::string& path, const std::string& bytes) {
   if (is_binary_gltf(bytes)) {
     constexpr size_t kStart = 20;  // of the first chunk's content; its length is at 12
     if (bytes.size() < kStart) return;
-    uint32_t length = 0;
+    uint32_t length = 0, version = 0;
+    std::memcpy(&version, bytes.data() + 4, sizeof(version));
+    if (version != 2) throw FileError(path, fmt::format("is of version {} of binary glTF, but 2 is read", version));
     std::memcpy(&length, bytes.data() + 12, sizeof(length));
     if (length > bytes.size() - kStart) return;  // tinygltf refuses it
     text = bytes.substr(kStart, length);

@@ -106,6 +106,11 @@ class MtlCleaner {
     static const std::set<std::string> kColours = {"Kd", "Ks", "Ke", "Ka"};
     static const std::set<std::string> kNumbers = {"Ns", "Ni", "d", "Tr", "illum"};
     static const std::set<std::string> kTextures = {"map_Kd", "map_Ks", "map_Ke", "map_d"};
+    // That the format has, and that are not read (docs/scene_format.md).
+    static const std::set<std::string> kOthers = {
+        "tf",     "sharpness", "pr",     "pm",      "ps",       "pc",       "pcr",     "aniso",      "anisor", "bump",
+        "disp",   "decal",     "refl",   "norm",    "map_bump", "map_disp", "map_ka",  "map_ns",     "map_pr", "map_pm",
+        "map_ps", "map_refl",  "map_tr", "map_aat", "map_norm", "map_rma",  "map_orm", "map_opacity"};
     if (key == "newmtl") {
       end_record();
       const std::string name = trimmed(rest);
@@ -116,6 +121,8 @@ class MtlCleaner {
       numbers(key, rest, kColours.count(key) != 0);
     } else if (kTextures.count(key)) {
       texture(key, rest);
+    } else if (!key.empty() && key[0] != '#' && kOthers.count(lower(key)) == 0) {
+      warn(kUnreadMtl, fmt::format("\"{}\" is not read", shown(key)));
     }
   }
 
@@ -137,6 +144,7 @@ class MtlCleaner {
         warn("negative numbers taken as 0", fmt::format("{} is {}; taken as 0", key, shown(word)));
         word = "0";
       }
+      if (key == "Ke" && value > 1e15) fail(fmt::format("Ke is {}, but must be at most 1e15", shown(word)));
       line += " " + word;
       ++count;
     }
@@ -257,7 +265,7 @@ void read_mtl(const std::string& path, ObjModel& model, std::map<std::string, ui
       const FoundFile file = find_beside(path, name);
       if (file.path.empty()) {
         warnings.add("missing textures", path, line_of(key),
-                     fmt::format("{}: the texture {} does not exist; {}", user, shown(name),
+                     fmt::format("{}: {}; {}", user, missing_file("texture", path, name),
                                  use == TextureUse::mask ? "taken as opaque" : "grey stands in"));
         return use == TextureUse::mask ? 0 : textures.grey();
       }
@@ -426,7 +434,7 @@ class ObjReader {
     for (const auto& name : names) {
       const FoundFile file = find_beside(path_, name);
       if (file.path.empty())
-        warn("missing material files", line, fmt::format("the material file {} does not exist", shown(name)));
+        warn("missing material files", line, missing_file("material file", path_, name));
       else if (!file.remark.empty())
         warn("names of material files that differ from their files'", line,
              fmt::format("the material file {} does not exist; {}", shown(name), file.remark));

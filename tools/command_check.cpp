@@ -49,7 +49,7 @@ void check_scene(Options o) {
   create_scene(api, o, device.get(), scene);
   create_integrator(api, o, device.get(), integrator);
   check_groups(api, o, o.groups);
-  const auto size = o.size.empty() ? std::vector<uint32_t>{} : numbers(o.size, 'x', 2, "--size");
+  const auto size = o.size.empty() ? std::vector<uint32_t>{} : image_size(o.size);
 
   bar.show("reading files", 0, 0);
   const io::SceneData data = read_scene_file(o.scene);

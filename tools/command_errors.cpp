@@ -79,7 +79,7 @@ class ErrorsCommand {
   explicit ErrorsCommand(const Options& options) : o_(options), bar_(options.quiet || options.json) {}
 
   void run() {
-    if (!o_.size.empty()) size_ = numbers(o_.size, 'x', 2, "--size");
+    if (!o_.size.empty()) size_ = image_size(o_.size);
     if (!o_.folder.empty()) {
       std::error_code code;
       std::filesystem::create_directory(o_.folder, code);

@@ -67,6 +67,8 @@ std::vector<Channel> choose_channels(const io::Api& api, const std::string& aske
   for (std::string word; std::getline(words, word, ',');) {
     const auto at = std::find_if(known.begin(), known.end(), [&](const Channel& c) { return c.name == word; });
     if (at == known.end()) throw UsageError(fmt::format("--layers: no layer \"{}\"; there are {}", word, names));
+    if (std::any_of(chosen.begin(), chosen.end(), [&](const Channel& c) { return c.name == word; }))
+      throw UsageError(fmt::format("--layers: {} stands there twice", word));
     chosen.push_back(*at);
   }
   return chosen;

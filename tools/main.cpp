@@ -73,6 +73,12 @@ int run(int argc, char** argv, int& output_error) {
   add_report(app);
   add_check(app);
   add_info(app);
+  // An empty one is what a script makes of a variable that is not set.
+  const CLI::Validator not_empty([](const std::string& text) { return std::string(text.empty() ? "is empty" : ""); },
+                                 "");
+  for (CLI::App* command : app.get_subcommands({}))
+    for (CLI::Option* option : command->get_options())
+      if (option->get_items_expected_max() > 0) option->check(not_empty);
   const auto complain = [](const char* text, int code) {
     print_error("lumicut: {}\n", text);
     return code;
@@ -81,6 +87,12 @@ int run(int argc, char** argv, int& output_error) {
     app.parse(argc, argv);
     return kOk;
   } catch (const CLI::ParseError& error) {
+    if (argc > 1 && argv[1][0] != '-' && app.get_subcommands().empty()) {
+      std::string names;
+      for (const CLI::App* command : app.get_subcommands({}))
+        names += (names.empty() ? "" : ", ") + command->get_name();
+      return complain(fmt::format("no command \"{}\"; there are {}", argv[1], names).c_str(), kUsage);
+    }
     errno = 0;
     const int code = app.exit(error) == 0 ? kOk : kUsage;  // --help is an error of code 0
     if (std::ferror(stdout)) output_error = errno;         // it has more than the stream holds back

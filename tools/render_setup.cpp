@@ -24,8 +24,8 @@ void add_setup_options(CLI::App& command, RenderSetup& setup) {
       ->capture_default_str();
   command.add_option("-p,--parameter", setup.parameters, "name=value, as `lumicut info` lists them; may be repeated")
       ->allow_extra_args(false);
-  command.add_option("--vpls", setup.vpls, "Number of virtual lights; as -p vpls=N");
-  command.add_option("--seed", setup.seed, "Seed of all randomness; as -p seed=N");
+  command.add_option("--vpls", setup.vpls, "Number of virtual lights; as -p vpls=N")->check(number_in(1, 1e8));
+  command.add_option("--seed", setup.seed, "Seed of all randomness; as -p seed=N")->check(number_in(0, 4294967295.0));
   command.add_option("--threads", setup.threads, "Threads; 0: all")->capture_default_str()->check(CLI::Range(0, 4096));
   command.add_option("--accel", setup.accel, "What traces rays: bvh, the library's own, or embree")
       ->capture_default_str();

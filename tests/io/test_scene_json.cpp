@@ -517,7 +517,8 @@ TEST(SceneJson, SyntaxErrorsNameLineAndColumn) {
   expect_in(text_error("{\"up\": \"y\", \"up\": \"z\"}"), {"\"up\"", "twice"});
   expect_in(text_error(std::string(100000, '[')), {"nested deeper"});
   expect_in(text_error("[1, 2]"), {"s.json", "an object"});
-  expect_in(text_error("\xff\xfe{}"), {"s.json", "line 1"});
+  expect_in(text_error("\xff\xfe{}"), {"s.json", "UTF-16"});
+  expect_in(text_error(std::string("{}\n\0", 4)), {"s.json", "line 2, column 1", "zero byte"});
   expect_in(error_of([&] { read_scene(folder / "none.json"); }), {"none.json", "no such file"});
   const std::string whole = kScene;
   for (size_t length = 0; length < whole.size() - 1; ++length)

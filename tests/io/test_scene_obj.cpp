@@ -247,6 +247,21 @@ TEST(UntidyObj, AMissingTextureIsGrey) {
   expect_in(model.warnings[0], {"m.mtl: line 3: ", "no.png", "material \"red\"", "grey stands in"});
 }
 
+TEST(UntidyObj, StatementsOfNoMtlAreTold) {
+  const TemporaryFolder folder;
+  expect_one_warning(with_mtl(folder, "newmtl red\nKd 1 0 0\nkd 0 1 0\nPr .5\nmap_Bump a.png\n"),
+                     {"m.mtl: line 3: ", "\"kd\" is not read"});
+  expect_in(error_of([&] { with_mtl(folder, "newmtl red\nKe 1e30 0 0\n"); }), {"m.mtl: line 2: ", "Ke is 1e30"});
+}
+
+TEST(UntidyObj, AnEmptyNameOfAMaterialFileAndAFolderAreCalledSo) {
+  const TemporaryFolder folder;
+  for (const auto& [name, said] : {std::pair{"", "the name of the material file is empty"}, {".", ". is a folder"}}) {
+    const auto model = read(folder.write("a.obj", "mtllib " + std::string(name) + "\n" + kTriangle + "f 1 2 3\n"));
+    expect_one_warning(model, {"a.obj: line 1: ", said});
+  }
+}
+
 TEST(UntidyObj, TheLastOfTwoDefinitionsCounts) {
   const TemporaryFolder folder;
   folder.write("n.mtl", "newmtl red\nKd 0 0 1\n");

@@ -180,6 +180,24 @@ class Arguments(Cli):
         self.assert_ends(lumicut(*SMALL, "--checkpoint", kept, "-o", self.folder / "a.exr"), OK)
         self.assert_ends(lumicut("render", self.scene(), "-q", "--checkpoint", kept, "--resume", "-o", self.folder / "b.exr"), BAD_FILE, str(kept))
 
+    def test_empty_values_are_refused(self):
+        out = self.folder / "a.exr"
+        for option in ("-i", "--png", "--stats", "--checkpoint", "--vpl-in", "--vpl-out", "--heat-map", "--layers", "--size", "--crop", "--builder"):
+            self.refused(USAGE, *SMALL[:2], "-q", "-o", out, option, "", says="is empty")
+        self.refused(USAGE, "render", "", "-o", out, says="scene: is empty")
+        self.refused(USAGE, "compare", out, "", says="reference: is empty")
+        self.assertFalse(out.exists())
+
+    def test_an_unknown_command_is_named(self):
+        self.refused(USAGE, "rendr", SCENE, says='no command "rendr"; there are render, ')
+
+    def test_whole_numbers_keep_their_sign(self):
+        for option in ("--vpls", "--seed"):
+            for value in ("-1", "99999999999999999999", "1x"):
+                self.refused(USAGE, *SMALL[:2], "-q", "-o", self.folder / "a.exr", option, value, says=f"{option}: {value} is no number from")
+        self.refused(USAGE, "check", SCENE, "--size", "0x5", says="--size 0x5: 0 is not 1 to 65536")
+        self.refused(USAGE, *SMALL, "--layers", "depth,depth", "-o", self.folder / "a.exr", says="depth stands there twice")
+
     def test_no_passes_without_another_end_are_refused(self):
         self.refused(USAGE, *SMALL, "--passes", "0", "-o", self.folder / "a.exr", says="--passes 0: until --seconds or --target-error")
         self.assert_ends(lumicut(*SMALL, "--passes", "0", "--seconds", "0.1", "-o", self.folder / "a.exr"), OK)

@@ -223,6 +223,11 @@ class Gltf(cli.Cli):
         wrong(lambda d: d.json["materials"][0].update(pbrMetallicRoughness={"roughnessFactor": 3}), "materials[0].roughnessFactor", "3")
         wrong(lambda d: d.json.update(extensionsRequired=["KHR_draco_mesh_compression"], extensionsUsed=["KHR_draco_mesh_compression"]),
               "KHR_draco_mesh_compression")
+        wrong(lambda d: d.json["asset"].update(version="1.0"), "asset.version", "1.0")
+        wrong(lambda d: d.json["materials"][0].update(alphaMode="CUT"), "materials[0].alphaMode", "CUT", "OPAQUE, MASK, BLEND")
+        wrong(lambda d: d.json["nodes"][0].update(matrix=[1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]), "nodes[0].matrix", "not affine")
+        for extension, key, value in (("specular", "specularFactor", 5), ("volume", "attenuationDistance", -1), ("volume", "attenuationColor", [2, 1, 1]), ("emissive_strength", "emissiveStrength", -2)):
+            wrong(lambda d: d.json["materials"][0].update(extensions={f"KHR_materials_{extension}": {key: value}}), f"materials[0].extensions.KHR_materials_{extension}.{key}")
         wrong(lambda d: d.json["nodes"].clear() or d.json["scenes"][0].update(nodes=[]), "no triangles")
         for name, content in (("torn.glb", b"glTF\2\0\0\0\xff\0\0\0"), ("text.gltf", b"{"), ("empty.gltf", b"")):
             (self.folder / name).write_bytes(content)
