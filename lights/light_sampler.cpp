@@ -208,6 +208,7 @@ void LightSampler::add_programmed(uint32_t id, const Progress* progress) {
   constexpr size_t kMostPoints = size_t{1} << 22, kFewest = 4, kFirst = 64, kLast = 1024;
   constexpr double kError = 0.05, kLeastShare = 0.02;
   const TextureProgram& program = *scene_.textures()[scene_.materials()[id].emission_texture].program();
+  const bool sides_differ = scene_.materials()[id].emit_both_sides && program.varies_with_view();
   for (uint32_t m = 0; m < scene_.meshes().size(); ++m) {
     const Mesh& mesh = scene_.meshes()[m];
     const size_t triangles = mesh.triangle_count();
@@ -235,7 +236,8 @@ void LightSampler::add_programmed(uint32_t id, const Progress* progress) {
           u -= std::floor(u), v -= std::floor(v);
           if (u + v > 1) u = 1 - u, v = 1 - v;
           const SurfaceHit place = scene_.place_on(m, t, static_cast<float>(u), static_cast<float>(v), i);
-          const double e = luminance(scene_.emitted_on_average(place, place.geometric_normal));
+          double e = luminance(scene_.emitted_on_average(place, place.geometric_normal));
+          if (sides_differ) e = 0.5 * (e + luminance(scene_.emitted_on_average(place, -place.geometric_normal)));
           sum += e, square += e * e;
         }
         const double mean = sum / static_cast<double>(n), variance = square / static_cast<double>(n) - mean * mean;

@@ -58,7 +58,8 @@ LightSampler::Surface LightSampler::sample_surface(const Emitter& e, Rng& rng) c
     hit.hit.u = s * (1.0f - v), hit.hit.v = s * v;
     hit.hit.prim = e.triangle, hit.hit.geom = e.index;
     hit.hit.inst = scene_.hit_instance(e.index, e.instance);
-    SurfaceHit surface = scene_.surface(hit);
+    const SurfaceHit surface = scene_.surface(hit);
+    Vec3f normal = surface.geometric_normal;
     const Transform& to_world = scene_.instance(e.index, e.instance);
     const uint32_t* index = &mesh.indices[3 * size_t{e.triangle}];
     const Vec3f a = to_world.point(mesh.positions[index[0]]);
@@ -66,13 +67,13 @@ LightSampler::Surface LightSampler::sample_surface(const Emitter& e, Rng& rng) c
                                            to_world.point(mesh.positions[index[2]]) - a));
     float area_pdf = 1.0f / area;
     if (material.emit_both_sides) {
-      if (rng.next_float() < 0.5f) surface.geometric_normal = -surface.geometric_normal;
+      if (rng.next_float() < 0.5f) normal = -normal;
       area_pdf *= 0.5f;
     }
-    Rgb radiance = scene_.emitted_on_average(surface, surface.geometric_normal);
+    Rgb radiance = scene_.emitted_on_average(surface, normal);
     if (material.cutout())
       radiance *= scene_.opacity(e.index, e.triangle, hit.hit.u, hit.hit.v, e.instance);  // as rays meet it
-    return {surface.position, surface.geometric_normal, radiance, area_pdf, surface.offset};
+    return {surface.position, normal, radiance, area_pdf, surface.offset};
   }
   const Light& l = scene_.lights()[e.index];
   const float offset = scene_.offset_at(l.position);

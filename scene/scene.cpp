@@ -116,6 +116,22 @@ bool passes_by_chance(float stops, uint32_t mesh, uint32_t prim, float u, float 
   return static_cast<float>(place >> 40) * 0x1p-24f >= stops;
 }
 
+// Which channel of colours a ray carries, by chance of its line (unit `dir`, on a grid as above): the same at all borders
+// that it passes, where its chances are products of this channel's shares then, and their mean that of the colours' products.
+int channel_of(const Vec3f& at, const Vec3f& dir, float extent) {
+  const auto cell = [](float x, float scale) {
+    return static_cast<uint64_t>(static_cast<int64_t>(std::floor(std::clamp(x * scale, -1e15f, 1e15f))));
+  };
+  const float side = dir.x + 2.0f * dir.y + 4.0f * dir.z < 0.0f ? -1.0f : 1.0f;  // the line's, not the ray's
+  const Vec3f d = dir * side, moment = cross(at, d);
+  const float fine = 16384.0f / std::max(extent, 1e-20f);
+  uint64_t line = 0;
+  for (int k = 0; k < 3; ++k) line = hash64(line, hash64(cell(d[k], 16384.0f), cell(moment[k], fine)));
+  const float u = static_cast<float>(line >> 40) * 0x1p-24f;
+  const float red = luminance({1, 0, 0}), green = luminance({0, 1, 0});
+  return u < red ? 0 : u < red + green ? 1 : 2;
+}
+
 }  // namespace
 
 void Scene::set_textures(std::vector<Texture> textures) {
@@ -358,7 +374,7 @@ bool Scene::passes(const CandidateHit& hit) const {
                           hit.u, hit.v);
 }
 
-// Visibility is a yes or no, so that the chance is the luminance of what passes.
+// Visibility is a yes or no: the chance is what passes of one channel, which is the luminance in the mean.
 bool Scene::passes_light(const CandidateHit& hit) const {
   const Mesh& mesh = meshes_[hit.mesh];
   const uint32_t id = mesh.material_of(hit.prim);
@@ -367,11 +383,12 @@ bool Scene::passes_light(const CandidateHit& hit) const {
   float stops = opacity(hit.mesh, hit.prim, hit.u, hit.v, instance_index, &hit.dir, true);
   if (stops > 0.0f && materials_[id].shadows_pass) {
     const uint32_t* t = &mesh.indices[3 * size_t{hit.prim}];
-    const Vec3f& corner = mesh.positions[t[0]];
+    Vec3f corner = mesh.positions[t[0]];
     Vec3f edges[2] = {mesh.positions[t[1]] - corner, mesh.positions[t[2]] - corner}, dir = hit.dir;
     if (hit.inst != kNoId) {
       const Transform& to_world = instance(hit.mesh, hit.inst - first_instance_[hit.mesh]);
-      edges[0] = to_world.vector(edges[0]), edges[1] = to_world.vector(edges[1]), dir = to_world.vector(dir);
+      corner = to_world.point(corner), edges[0] = to_world.vector(edges[0]), edges[1] = to_world.vector(edges[1]),
+      dir = to_world.vector(dir);
     }
     const Vec3f normal = normalize(cross(edges[0], edges[1])), to_viewer = -normalize(dir);
     const SurfaceView view{{}, normal, normal, to_viewer, 0.0f};
@@ -391,7 +408,9 @@ bool Scene::passes_light(const CandidateHit& hit) const {
       const float way = 0.5f * size * thickness_[hit.mesh] / std::max(inside, 1e-3f);
       for (int k = 0; k < 3; ++k) passed[k] *= std::exp(-glass.absorption[k] * way);
     }
-    stops *= 1.0f - luminance(passed);
+    const bool grey = passed.x == passed.y && passed.y == passed.z;
+    const Vec3f at = corner + edges[0] * hit.u + edges[1] * hit.v;
+    stops *= 1.0f - (grey ? luminance(passed) : passed[channel_of(at, to_viewer, extent_.radius())]);
   }
   return passes_by_chance(stops, hit.mesh, hit.prim, hit.u, hit.v);
 }

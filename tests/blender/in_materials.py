@@ -267,6 +267,30 @@ class Materials(unittest.TestCase):
         np.testing.assert_allclose(a.mean((0, 1)), b.mean((0, 1)), rtol=0.02)
         self.assertEqual(h.last_notes(), [])
 
+    def test_panels_that_shine_on_one_side_light_that_side(self):
+        """Emission and a dark back, mixed by Backfacing, above a floor: turned down, and turned up."""
+        h.add_plane(6, material=h.diffuse((0.8, 0.8, 0.8), "floor"))
+        m = h.material("panel")
+        tree = m.node_tree
+        sides, mix, light, back = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("NewGeometry", "MixShader", "Emission", "BsdfDiffuse"))
+        light.inputs["Strength"].default_value, back.inputs["Color"].default_value = 5, (0.05, 0.05, 0.05, 1)
+        for source, socket in ((sides.outputs["Backfacing"], 0), (light.outputs[0], 1), (back.outputs[0], 2)):
+            tree.links.new(source, mix.inputs[socket])
+        tree.links.new(mix.outputs[0], next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL").inputs["Surface"])
+        panel = h.add_mesh("Panel", [(-0.5, -0.5, 0), (0.5, -0.5, 0), (0.5, 0.5, 0), (-0.5, 0.5, 0)], [(0, 1, 2, 3)], m)
+        bpy.context.scene.camera.location = (0, 0, 0.9)
+        bpy.context.scene.camera.data.type, bpy.context.scene.camera.data.ortho_scale = "ORTHO", 2
+        panel.location.z = 1
+        means = []
+        for turn in (0, np.pi):
+            panel.rotation_euler.x = turn
+            ours, theirs = h.both(256, 64, 0, vpls=2000, compensate=True, clamp_lights=1000)
+            a, b = (image["Combined"][..., :3].mean() for image in (ours, theirs))
+            np.testing.assert_allclose(a, b, rtol=0.03, atol=1e-4)  # what is clamped beneath so near a lamp is noise
+            means.append(a)
+        self.assertLess(means[0], 1e-3)
+        self.assertGreater(means[1], 0.5)
+
     def panes(self, shader):
         """A floor half under a pane that `shader` makes of its tree, seen from above: Cycles' means of both halves and ours."""
         scene = h.new_scene(32, 32)

@@ -207,6 +207,30 @@ TEST(ShadowsPass, DimmedByColourOpacityAndTheShareOfGlass) {
   EXPECT_LT(passed(m), 1.0);
 }
 
+TEST(ShadowsPass, ColoursOfBordersMultiplyChannelByChannel) {
+  Scene scene(Scene::Config{"bvh", true});
+  Material m = pane();
+  m.ior = 1.0f, m.diffuse = {0.81f, 0.04f, 0.01f};
+  scene.set_materials({m});
+  Mesh mesh;
+  for (const float z : {0.0f, -0.3f, -0.7f}) test::add_quad(mesh, {-9, -9, z}, {9, -9, z}, {9, 9, z}, {-9, 9, z}, 0);
+  scene.add_mesh(std::move(mesh));
+  Progress progress;
+  scene.commit(progress);
+  Rng rng(6, Stage::test);
+  constexpr size_t kRays = test::trimmed(40000);
+  for (const bool parallel : {false, true}) {
+    std::vector<Ray> rays(kRays);
+    for (Ray& r : rays) {
+      const Vec3f place{rng.next_float(), rng.next_float(), -1};
+      r.org = parallel ? place + Vec3f{0.5f, 0.2f, 2} : Vec3f{0.5f, 0.2f, 1};
+      r.dir = place - r.org, r.tfar = 1;
+    }
+    const double expected = 0.2126 * std::pow(0.9, 3) + 0.7152 * std::pow(0.2, 3) + 0.0722 * std::pow(0.1, 3);
+    EXPECT_NEAR(share_passed(stopped(scene, rays)), expected, 4 * std::sqrt(0.25 / kRays)) << parallel;
+  }
+}
+
 TEST(ShadowsPass, ButForSurfacesBehindTheGlass) {
   for (const char* backend : test::backends()) {
     Scene scene(Scene::Config{backend, true});
