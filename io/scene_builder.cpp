@@ -629,7 +629,7 @@ void SceneBuilder::add(const std::string& name, const Geometry& geometry, const 
   for (const double v : place.m)
     if (!(std::abs(v) < kLargestCoordinate)) fail(name, fmt::format("its transform has the number {}", v));
   if (!(std::abs(place.determinant()) > 0)) return leave_out(name + ", which is scaled to nothing");
-  if (geometry.indices.empty()) return;
+  if (geometry.indices.empty()) return leave_out(name + ", which has no triangles");
   const std::string whole = fmt::format("{} {} {} {}", key, material, flipped, mask);
   if (!key.empty()) {
     const auto known = shared_.find(whole);

@@ -731,12 +731,15 @@ class Reader {
       }
     } else if (kind == "cylinder") {
       const Vec p0 = vector_of(child(node, "p0"), {0, 0, 0}), p1 = vector_of(child(node, "p1"), {0, 0, 1});
+      const double radius = number(node, "radius", 1);
+      if (!(radius > 0)) fail(node, fmt::format("its radius is {:g}", radius));
+      if (!(length(p1 - p0) > 0)) fail(node, "its p0 and p1 are one");
       const Vec z = unit(p1 - p0), x = unit(cross(std::abs(z[0]) > 0.9 ? Vec{0, 1, 0} : Vec{1, 0, 0}, z)),
                 y = cross(z, x);
       Affine stand = translation(p0);
       for (size_t r = 0; r < 3; ++r) stand.m[4 * r] = x[r], stand.m[4 * r + 1] = y[r], stand.m[4 * r + 2] = z[r];
       place = place * stand;
-      all.push_back(upside_down(cylinder_geometry(number(node, "radius", 1), 0, length(p1 - p0), 2 * kPi)));
+      all.push_back(upside_down(cylinder_geometry(radius, 0, length(p1 - p0), 2 * kPi)));
     } else if (kind == "obj" || kind == "ply" || kind == "serialized") {
       found_file(node, "mesh", word(node, "filename", ""));
       all = kind == "serialized" ? serialized(node) : build_.read_meshes(word(node, "filename", ""));
@@ -914,8 +917,10 @@ class Reader {
     c.shift[0] = static_cast<float>(number(node, "principal_point_offset_x", 0) * -aspect);
     c.shift[1] = static_cast<float>(number(node, "principal_point_offset_y", 0));
     if (kind == "thinlens") {
-      c.lens_radius = static_cast<float>(number(node, "aperture_radius", 0));
-      c.focus_distance = static_cast<float>(number(node, "focus_distance", 1));
+      const double lens = number(node, "aperture_radius", 0), focus = number(node, "focus_distance", 1);
+      if (!(lens >= 0)) fail(node, fmt::format("its aperture_radius is {:g}", lens));
+      if (!(focus > 0)) fail(node, fmt::format("its focus_distance is {:g}", focus));
+      c.lens_radius = static_cast<float>(lens), c.focus_distance = static_cast<float>(focus);
     }
     has_camera_ = true;
     tell_unread(node,

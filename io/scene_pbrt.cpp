@@ -168,6 +168,7 @@ class Reader {
       times(scaling({n[0], n[1], n[2]}));
     } else if (word == "Rotate") {
       const auto n = numbers(4, "Rotate");
+      if (n[0] != 0 && !(length(Vec{n[1], n[2], n[3]}) > 0)) tokens_.fail("Rotate turns about no axis");
       times(rotation({n[1], n[2], n[3]}, radians(n[0])));
     } else if (word == "LookAt") {
       look_at();
@@ -249,6 +250,9 @@ class Reader {
     static const std::set<std::string> kPassed = {"Sampler", "Integrator", "PixelFilter", "Accelerator", "ColorSpace"};
     if (word == "Texture") {
       const std::string name = quoted("Texture"), type = quoted("Texture"), kind = quoted("Texture");
+      if (type != "float" && type != "spectrum" && type != "color")
+        tokens_.fail(
+            fmt::format("the texture \"{}\" is of the type \"{}\", not float or spectrum", shown(name), shown(type)));
       const Parameters p = parameters("texture");
       texture(name, type, kind, p);
       tell_unread(fmt::format("textures of the kind {}", kind), p);
@@ -363,13 +367,16 @@ class Reader {
       for (size_t k = 0; k < 4; ++k) c.to_world[4 * r + k] = static_cast<float>(row[k]);
     }
     const double aspect = camera_.number("frameaspectratio", double(build_.scene.width) / build_.scene.height);
+    if (!(aspect > 0)) build_.fail("Camera", fmt::format("its frameaspectratio is {:g}", aspect));
     double window[4] = {-1, 1, -1, 1};
     if (aspect > 1)
       window[0] = -aspect, window[1] = aspect;
     else
       window[2] = -1 / aspect, window[3] = 1 / aspect;
-    if (const PbrtParameter* p = camera_.find("screenwindow"); p != nullptr && p->numbers.size() == 4)
+    if (const PbrtParameter* p = camera_.find("screenwindow"); p != nullptr) {
+      if (p->numbers.size() != 4) p->fail(fmt::format("has {} numbers instead of 4", p->numbers.size()));
       std::copy(p->numbers.begin(), p->numbers.end(), window);
+    }
     const double height = window[3] - window[2];
     if (!(height > 0 && window[1] > window[0])) build_.fail("Camera", "its screenwindow is empty");
     c.shift[0] = static_cast<float>((window[0] + window[1]) / 2 / height);
@@ -385,7 +392,9 @@ class Reader {
       c.fov_y = static_cast<float>(2 * std::atan(std::tan(radians(fov) / 2) * height / 2));
     }
     const double lens = camera_.number("lensradius", 0), focus = camera_.number("focaldistance", 1e6);
-    if (lens > 0 && focus > 0) c.lens_radius = static_cast<float>(lens), c.focus_distance = static_cast<float>(focus);
+    if (!(lens >= 0)) build_.fail("Camera", fmt::format("its lensradius is {:g}", lens));
+    if (lens > 0 && !(focus > 0)) build_.fail("Camera", fmt::format("its focaldistance is {:g}", focus));
+    if (lens > 0) c.lens_radius = static_cast<float>(lens), c.focus_distance = static_cast<float>(focus);
     for (const char* name : {"shutteropen", "shutterclose"}) camera_.ignore(name);
     tell_unread(fmt::format("Camera \"{}\"", camera_kind_), camera_);
   }
@@ -404,7 +413,10 @@ class Reader {
       while (const auto token = words.next()) values.push_back(pbrt_number(words, *token, "a spectrum's file"));
     }
     if (values.size() % 2 != 0) p.fail(fmt::format("has {} numbers, not pairs", values.size()));
-    for (size_t i = 0; i + 1 < values.size(); i += 2) out.emplace_back(values[i], values[i + 1]);
+    for (size_t i = 0; i + 1 < values.size(); i += 2) {
+      if (values[i + 1] < 0) p.fail(fmt::format("has the value {:g} at {:g} nm", values[i + 1], values[i]));
+      out.emplace_back(values[i], values[i + 1]);
+    }
     std::sort(out.begin(), out.end());
     return out;
   }
@@ -755,16 +767,22 @@ class Reader {
 
   // ---- Lights
 
+  // What counts for nothing, as pbrt has it. -1 is its "not given".
+  void tell_powers(const Parameters& p, const std::string& name) {
+    for (const PbrtParameter& q : p.list)
+      if ((q.name == "power" || q.name == "illuminance") && q.numbers.size() == 1 && !(q.numbers[0] > 0) &&
+          q.numbers[0] != -1)
+        build_.scene.warnings.add("values out of range", *q.file, q.line,
+                                  fmt::format("{}: {} is {:g}, which counts for nothing", name, q.name, q.numbers[0]));
+  }
   void light(const std::string& kind, const Parameters& p) {
     const std::string name = fmt::format("LightSource \"{}\" ({})", kind, tokens_.where());
     lumicut_light l{};
     double scale = p.number("scale", 1);
-    for (const PbrtParameter& q : p.list)
-      if ((q.name == "power" || q.name == "illuminance") && q.numbers.size() == 1 && !(q.numbers[0] > 0) &&
-          q.numbers[0] != -1)  // pbrt's "not given"
-        build_.scene.warnings.add("values out of range", *q.file, q.line,
-                                  fmt::format("{}: {} is {:g}, which counts for nothing", name, q.name, q.numbers[0]));
+    tell_powers(p, name);
     const Vec from = p.vector("from", {0, 0, 0}), to = p.vector("to", {0, 0, 1});
+    if ((kind == "spot" || kind == "distant") && !(length(state_.ctm.vector(to - from)) > 0))
+      tokens_.fail(fmt::format("{} shines in no direction", name));
     if (kind == "point" || kind == "spot") {
       Vec intensity = colour(p.find("I"), {1, 1, 1}, Use::light);
       const Vec place = state_.ctm.point(from);
@@ -957,7 +975,9 @@ class Reader {
     Geometry g;
     std::string key;
     std::vector<Geometry> several;
-    const double radius = p.number("radius", 1), sweep = radians(std::clamp(p.number("phimax", 360), 0.1, 360.0));
+    const double radius = p.number("radius", 1),
+                 sweep = radians(build_.cut(p.number("phimax", 360), 0.1, 360, at(name, "phimax")));
+    if (radius < 0) tokens_.fail(fmt::format("{} has a radius of {:g}", name, radius));
     if (kind == "sphere") {
       const double z0 = radius != 0 ? p.number("zmin", -radius) / radius : -1,
                    z1 = radius != 0 ? p.number("zmax", radius) / radius : 1;
@@ -968,7 +988,8 @@ class Reader {
         key = fmt::format("sphere {} {} {}", z0, z1, sweep);
       place = place * scaling({radius, radius, radius});
     } else if (kind == "disk") {
-      const double height = p.number("height", 0), inner = p.number("innerradius", 0);
+      const double height = p.number("height", 0),
+                   inner = build_.cut(p.number("innerradius", 0), 0, radius, at(name, "innerradius"));
       g = disk_geometry(height, radius, inner, sweep);
       key = fmt::format("disk {} {} {} {}", height, radius, inner, sweep);
     } else if (kind == "cylinder") {
@@ -1069,7 +1090,8 @@ class Reader {
     const double scale = p.number("scale", 1);
     const Vec absorbed = colour(p.find("sigma_a"), {0.0011, 0.0024, 0.014}, Use::number) * scale;
     const Vec scattered = colour(p.find("sigma_s"), {2.55, 3.21, 3.77}, Use::number);
-    media_[name] = {absorbed, std::max({scattered[0], scattered[1], scattered[2]}) > 0};
+    const Vec kept = cut(absorbed, 0, 1e15, at(fmt::format("medium \"{}\"", shown(name)), "sigma_a"));
+    media_[name] = {kept, std::max({scattered[0], scattered[1], scattered[2]}) > 0};
     for (const char* ignored : {"type", "g"}) p.ignore(ignored);
     tell_unread("media", p);
   }
@@ -1212,6 +1234,7 @@ class Reader {
       picture = build_.image(file, TextureUse::colour, 0, "the light is even");
       radiance = {1, 1, 1};
     }
+    tell_powers(p, "the area light");
     if (const double power = p.number("power", -1); power > 0) {
       double area = 0;
       for (size_t i = 0; i + 2 < g.indices.size(); i += 3) {

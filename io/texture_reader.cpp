@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <limits>
 
 #include "io/file_error.h"
 #include "io/image_module.h"
@@ -67,12 +68,15 @@ Texture read_texture(const std::string& path, std::string_view held, TextureUse 
   } else {
     texture.flags &= ~uint32_t{LUMICUT_BLEND_STORED};  // floats are linear
     read(texture.floats, OIIO::TypeDesc::FLOAT);
+    // Times the factors that scenes have, light stays finite.
+    const float most = use == TextureUse::radiance ? 1e20f : std::numeric_limits<float>::max();
     for (size_t i = 0; i < texture.floats.size(); ++i) {
       const float value = texture.floats[i];
-      if (std::isfinite(value) && value >= 0.0f) continue;
+      if (std::isfinite(value) && value >= 0.0f && value <= most) continue;
       const size_t pixel = i / static_cast<size_t>(out);
-      throw FileError(path, fmt::format("pixel ({}, {}) is {}; a texture (of {}) must be finite and not negative",
-                                        pixel % texture.width, pixel / texture.width, value, user));
+      throw FileError(path, fmt::format("pixel ({}, {}) is {}; a texture (of {}) must be finite and not negative{}",
+                                        pixel % texture.width, pixel / texture.width, value, user,
+                                        value > most && std::isfinite(value) ? ", at most 1e20" : ""));
     }
   }
   return texture;

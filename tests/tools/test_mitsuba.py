@@ -369,6 +369,8 @@ class Mitsuba(SceneFiles):
                             ('<shape type="sphere"><float name="radius" value="$no"/></shape>', ("$no",)), (camera((0, 0, 1), (0, 0, 0), 400), ("fov", "400")),
                             ('\n<shape type="obj"><string name="filename" value="a"/><string name="filename" value="b"/></shape>', ("line 4", "filename", "given twice")),
                             ('<shape type="obj"/>', ("line 3", "name of the mesh is empty")), ('<shape type="ply"><string name="filename" value="."/></shape>', ("is a folder",)),
+                            ('<shape type="cylinder"><float name="radius" value="0"/></shape>', ("radius is 0",)), ('<shape type="cylinder"><point name="p1" x="0" y="0" z="0"/></shape>', ("p0 and p1",)),
+                            (camera((0, 0, 1), (0, 0, 0), more='<float name="aperture_radius" value="-1"/>').replace("perspective", "thinlens"), ("aperture_radius is -1",)),
                             ('<path/>', ("line 3", "<path>", "names no folder")), ('<path value="none"/>', ("none is no folder",)), ('<path value="loop.xml"/>', ("loop.xml is no folder",)),
                             ('<shape type="sphere" id="a"/><shape type="cube" id="a"/>', ("line 3", 'id="a"', "of that id")),
                             ('<shape type="sphere"><boolean name="flip_normals" value="yes"/></shape>', ("yes", "true or false")),

@@ -520,7 +520,9 @@ class Pbrt(SceneFiles):
                             (hair.format('"float eumelanin" -1'), "eumelanin is -1"), (hair.format('"rgb sigma_a" [ 1 1 -1 ]'), "sigma_a is -1"),
                             (hair.format('"float beta_n" 9'), "beta_n is 9"), (hair.format('"rgb reflectance" [ 2 2 2 ]'), "reflectance is 2"),
                             ('LightSource "distant" "float illuminance" -3', "illuminance is -3, which counts for nothing"),
-                            ('Shape "sphere" "float alpha" 3', "alpha is 3"), ('LightSource "distant" "rgb L" [ 1 1 1 ] "float scale" 1 "float scale" 2', "is given twice")):
+                            ('Shape "sphere" "float alpha" 3', "alpha is 3"), ('Shape "disk" "float innerradius" 3', "innerradius is 3, not 0 to 1"), ('Shape "sphere" "float phimax" -9', "phimax is -9"),
+                            ('AttributeBegin AreaLightSource "diffuse" "float power" -3 Shape "sphere" AttributeEnd', "power is -3, which counts for nothing"),
+                            ('Shape "sphere" "float zmin" .5 "float zmax" .5', "which has no triangles: left out"), ('LightSource "distant" "rgb L" [ 1 1 1 ] "float scale" 1 "float scale" 2', "is given twice")):
             with self.subTest(words):
                 _, said_here = self.render(self.floor('Texture "u" "spectrum" "checkerboard"\n' + words, ""), "--vpls", 10)
                 self.assertIn(said, said_here)
@@ -547,6 +549,7 @@ class Pbrt(SceneFiles):
         self.write("open.pbrt", "\nTranslate 1 x")
         (self.folder / "folder.pbrt").mkdir()
         self.write_exr("bright.exr", np.full((8, 8, 3), 1e38, np.float32))
+        self.write_exr("strong.exr", np.full((8, 8, 3), 1e18, np.float32))
         os.mkfifo(self.folder / "pipe.pbrt")
         for change, texts in ((("WorldBegin", "WorldBegn"), ("line 4", "WorldBegn")), (("0 1 2 0 2 3", "0 1 2 0 2 9"), ("9", "4 vertices")),
                               (("fov\" 1", "fov\" x"), ("line 3", "\"x\"")), (("LookAt 0 4 0.001", "LookAt 0 0 0"), ("its own place",)),
@@ -562,7 +565,15 @@ class Pbrt(SceneFiles):
                               (("WorldBegin", 'WorldBegin Include "open.pbrt"'), ("open.pbrt: line 2", "finite number")),
                               (("WorldBegin", 'WorldBegin LightSource "infinite" "rgb L" [ -1 0 0 ]'), ("line 4", "colour of -1")),
                               (("WorldBegin", 'WorldBegin AttributeBegin AreaLightSource "diffuse" "rgb L" [ -1 0 0 ] Shape "sphere" AttributeEnd'), ("line 4", "colour of -1")),
-                              (("WorldBegin", 'WorldBegin LightSource "goniometric" "string filename" "bright.exr"'), ("line 4", "bright.exr", "1e+38")),
+                              (("WorldBegin", 'WorldBegin LightSource "goniometric" "string filename" "strong.exr"'), ("line 4", "strong.exr", "1e+18")),
+                              (("WorldBegin", "WorldBegin Rotate 9 0 0 0"), ("line 4", "no axis")), (("WorldBegin", 'WorldBegin Texture "t" "colour" "constant"'), ("line 4", '"colour"')),
+                              (("\"float fov\" 1", '"float lensradius" -1'), ("lensradius is -1",)), (("\"float fov\" 1", '"float lensradius" 1 "float focaldistance" 0'), ("focaldistance is 0",)),
+                              (("\"float fov\" 1", '"float screenwindow" [ 1 2 ]'), ("line 3", "2 numbers instead of 4")), (("\"float fov\" 1", '"float frameaspectratio" 0'), ("frameaspectratio is 0",)),
+                              (("WorldBegin", 'WorldBegin LightSource "distant" "point3 to" [ 0 0 0 ]'), ("line 4", "in no direction")),
+                              (("WorldBegin", 'WorldBegin LightSource "point" "spectrum I" [ 400 1 500 -1 ]'), ("line 4", "-1 at 500 nm")),
+                              (("WorldBegin", 'WorldBegin LightSource "point" "spectrum I" [ 400 1 500 ]'), ("line 4", "3 numbers, not pairs")),
+                              (("WorldBegin", 'WorldBegin LightSource "infinite" "string filename" "bright.exr"'), ("bright.exr", "1e+38", "at most 1e20")),
+                              (("WorldBegin", 'WorldBegin Shape "cylinder" "float radius" -1'), ("line 4", "radius of -1")),
                               *((("WorldBegin", f'WorldBegin Shape "curve" "point3 P" [ 0 0 0 1 1 1 2 2 2 3 3 3 ] {words}'), ("line 4", said)) for words, said in (
                                   ('"string width" "a"', "not a number"), ('"float width" [ 1 2 ]', "2 numbers instead of one"), ('"float type" 3', "not a text"),
                                   ('"integer degree" 2.5', "no whole number"), ('"point3 N" "a"', "no number"), ('"string N" 1', "no text in quotes"),
