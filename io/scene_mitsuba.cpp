@@ -12,6 +12,7 @@
 #include <optional>
 #include <pugixml.hpp>
 #include <set>
+#include <utility>
 
 #include "io/curves.h"
 #include "io/file_error.h"
@@ -89,6 +90,10 @@ class Reader {
     const std::string text = read_whole_file(path, kMostBytes);
     documents_.emplace_back();
     const auto result = documents_.back().load_buffer(text.data(), text.size());
+    if (const size_t zero = text.find('\0'); result.encoding == pugi::encoding_utf8 && zero != std::string::npos)
+      throw FileError(path,
+                      fmt::format("line {}: a zero byte",
+                                  1 + std::count(text.begin(), text.begin() + static_cast<ptrdiff_t>(zero), '\n')));
     if (!result) {
       const auto end = text.begin() + std::clamp<ptrdiff_t>(result.offset, 0, static_cast<ptrdiff_t>(text.size()));
       throw FileError(path, fmt::format("line {}: {}", 1 + std::count(text.begin(), end, '\n'), result.description()));
@@ -100,6 +105,8 @@ class Reader {
     const Node root = documents_.back().document_element();
     if (std::string(root.name()) != "scene")
       throw FileError(path, fmt::format("its first element is <{}>, not <scene>", shown(root.name())));
+    for (Node next = root.next_sibling(); next; next = next.next_sibling())
+      if (next.type() == pugi::node_element) fail(next, "stands after the end of the <scene>");
     upgrade_mitsuba(root);
     const std::string folder = std::filesystem::path(path).parent_path().string();
     for (const Node& child : root.children()) gather(child, folder);
@@ -356,8 +363,13 @@ class Reader {
     if (list.size() < 2 || list.size() % 2 != 0) fail(node, fmt::format("has {} numbers, not pairs", list.size()));
     Spectrum out;
     for (size_t i = 0; i + 1 < list.size(); i += 2) out.emplace_back(list[i], list[i + 1]);
+    check_spectrum(node, out);
     std::sort(out.begin(), out.end());
     return out;
+  }
+  void check_spectrum(const Node& node, const Spectrum& spectrum) const {
+    if (const auto below = below_zero(spectrum))
+      fail(node, fmt::format("has the value {:g} at {:g} nm", below->second, below->first));
   }
   static std::string without_comments(std::string from) {
     for (size_t at = 0; (at = from.find('#', at)) != std::string::npos;)
@@ -377,6 +389,7 @@ class Reader {
       fail(node, fmt::format("has {} values at {} wavelengths", values.size(), lengths.size()));
     Spectrum out;
     for (size_t i = 0; i < values.size(); ++i) out.emplace_back(lengths[i], values[i]);
+    check_spectrum(node, out);
     std::sort(out.begin(), out.end());
     return out;
   }
@@ -454,6 +467,8 @@ class Reader {
       const std::string wrap = word(node, "wrap_mode", "repeat");
       uint32_t flags = wrap == "clamp" ? uint32_t{LUMICUT_CLAMP} : 0u;
       if (wrap == "mirror") out.mode = 2;
+      if (wrap != "repeat" && wrap != "clamp" && wrap != "mirror")
+        fail(child(node, "wrap_mode"), fmt::format("is \"{}\", not repeat, mirror or clamp", shown(wrap)));
       if (word(node, "filter_type", "bilinear") == "nearest") flags |= LUMICUT_NEAREST;
       const bool raw = truth(node, "raw", false) || numbers_alone;
       out.kind = Paint::Kind::image;
@@ -760,9 +775,12 @@ class Reader {
     }
     uint32_t material = grey_;
     if (const Node c = inner(node)) material = bsdf(c);
+    if (const Node second = inner(node, 1)) fail(second, "is the second bsdf of a shape");
+    bool emits = false;
     for (const Node& inside : node.children()) {
       const Node c = std::string(inside.name()) == "ref" ? referred(inside) : inside;
       if (std::string(c.name()) == "emitter") {
+        if (std::exchange(emits, true)) fail(inside, "is the second emitter of a shape");
         if (text(c, "type") != "area") {
           build_.leave_out(fmt::format("emitters of the kind {} on shapes", text(c, "type")));
           continue;
@@ -862,10 +880,12 @@ class Reader {
     return {read_serialized_mesh(path, static_cast<size_t>(index))};
   }
   void instance(const Node& node, const Affine& place) {
+    bool has_group = false;
     for (const Node& c : node.children()) {
       const Node found = std::string(c.name()) == "ref" ? referred(c) : c;
       if (std::string(found.name()) != "shape") continue;
       if (text(found, "type") != "shapegroup") fail(node, "is of no shapegroup");
+      has_group = true;
       const std::string id = fmt::format("group {}", found.hash_value());
       if (groups_.count(id) == 0) {
         groups_[id];
@@ -876,6 +896,7 @@ class Reader {
         for (const Geometry& g : part.geometry)
           build_.add(part.name, g, place * part.place, part.material, part.flipped, fmt::format("{} {}", id, number++));
     }
+    if (!has_group) fail(node, "is of no shapegroup");
   }
 
   // ---- Camera and lights
@@ -887,6 +908,8 @@ class Reader {
       const double width = number(film, "width", 768), height = number(film, "height", 576);
       if (!(width >= 1 && width <= 65536 && height >= 1 && height <= 65536))
         fail(film, fmt::format("has {} by {} pixels", width, height));
+      if (width != std::floor(width) || height != std::floor(height))
+        fail(film, fmt::format("has {} by {} pixels, which are no whole numbers", width, height));
       build_.scene.width = static_cast<uint32_t>(width), build_.scene.height = static_cast<uint32_t>(height);
       if (child(film, "crop_width")) build_.leave_out("the film's crop");
     }

@@ -413,10 +413,9 @@ class Reader {
       while (const auto token = words.next()) values.push_back(pbrt_number(words, *token, "a spectrum's file"));
     }
     if (values.size() % 2 != 0) p.fail(fmt::format("has {} numbers, not pairs", values.size()));
-    for (size_t i = 0; i + 1 < values.size(); i += 2) {
-      if (values[i + 1] < 0) p.fail(fmt::format("has the value {:g} at {:g} nm", values[i + 1], values[i]));
-      out.emplace_back(values[i], values[i + 1]);
-    }
+    for (size_t i = 0; i + 1 < values.size(); i += 2) out.emplace_back(values[i], values[i + 1]);
+    if (const auto below = below_zero(out))
+      p.fail(fmt::format("has the value {:g} at {:g} nm", below->second, below->first));
     std::sort(out.begin(), out.end());
     return out;
   }

@@ -106,6 +106,14 @@ Vec rgb_of_xyz(const Vec& c) {
 
 }  // namespace
 
+std::optional<std::pair<double, double>> below_zero(const Spectrum& spectrum) {
+  double most = 0;
+  for (const auto& sample : spectrum) most = std::max(most, sample.second);
+  for (const auto& sample : spectrum)
+    if (sample.second < -0.01 * most) return sample;
+  return std::nullopt;
+}
+
 Vec rgb_of_spectrum(const Spectrum& spectrum) {
   if (spectrum.empty()) return {0, 0, 0};
   Vec sum{0, 0, 0};

@@ -12,6 +12,9 @@ namespace lumicut::io {
 
 using Spectrum = std::vector<std::pair<double, double>>;  // wavelength in nm, rising, and value; linear between
 
+// A value below 0 that no measurement has by its noise, a hundredth of the largest, and its wavelength.
+std::optional<std::pair<double, double>> below_zero(const Spectrum& spectrum);
+
 // CIE's integral over that of Y: a flat spectrum of 1 has Y = 1, and is not grey.
 Vec rgb_of_spectrum(const Spectrum& spectrum);
 // Of a reflectance or an index: even ones are grey.
