@@ -55,6 +55,8 @@ class PointBsdf {
   }
 
   bool black() const { return black_; }
+  // Chance that a sample follows the glossy lobe.
+  float glossy_share() const { return 1.0f - diffuse_share_; }
   // Share of the light that the lobes send back, as if none fell below the horizon.
   Rgb albedo() const { return point_.diffuse * std::numbers::pi_v<float> + specular_albedo(point_); }
 

@@ -59,8 +59,10 @@ ParamTable common_params() {
           "lost, at the price of noise that passes average out")),
       of_virtual_lights(flag<&P::trace_gloss>(
           "trace_gloss", "Trace gloss",
-          "With Compensate: what surfaces of little roughness mirror of bounced light is found by rays instead of "
-          "virtual lights, the more the smoother they are: fine noise in place of blots on worktops and floors")),
+          "With Compensate: what surfaces of little roughness (below .35) mirror of bounced light and of the sky is "
+          "found "
+          "by rays instead of virtual lights: fine noise, which denoising takes away, in place of blots on worktops, "
+          "water and metal")),
       of_virtual_lights(flag<&P::importance>(
           "importance", "Importance",
           "Virtual lights are put where the camera sees their light, and few elsewhere: for buildings of many rooms, "

@@ -94,11 +94,13 @@ VplSet trace_vpls(const Scene& scene, const LightSampler& emitters, const VplOpt
         direct -= std::min(direct, environment);
       direct = emitters.has_extended() ? std::max<uint64_t>(1, direct) : 0;
     }
+    set.first_of_sky = set.lights.size();
     for (uint64_t i = 0; i < environment; ++i) {
       if (i % 4096 == 0) progress.check();
       const Vpl v = emitters.environment_light(i, environment, options.seed);
       if (max_component(v.intensity) > 0.0f && is_finite(v.intensity)) set.lights.push_back(v);
     }
+    set.of_sky = set.lights.size() - set.first_of_sky;
     for (uint64_t i = 0; i < direct; ++i) {
       if (i % 4096 == 0) progress.check();
       Rng rng(options.seed, Stage::light_path, i, 1);

@@ -54,11 +54,12 @@ struct Vpl {
 
 struct VplSet {
   std::vector<Vpl> lights;
-  uint64_t light_paths = 0;  // that were started; 0 where nothing is known of the lights
-  uint64_t direct = 0;       // the first so many shine by themselves; likewise 0
-  uint64_t extended = 0;     // samples drawn on emitters with extent for those; some give no light
-  LightProfiles profiles;    // those that lights name
-  LUMICUT_FIELDS(VplSet, lights, light_paths, direct, extended, profiles)
+  uint64_t light_paths = 0;               // that were started; 0 where nothing is known of the lights
+  uint64_t direct = 0;                    // the first so many shine by themselves; likewise 0
+  uint64_t first_of_sky = 0, of_sky = 0;  // those of them that stand for the environment
+  uint64_t extended = 0;                  // samples drawn on emitters with extent for those; some give no light
+  LightProfiles profiles;                 // those that lights name
+  LUMICUT_FIELDS(VplSet, lights, light_paths, direct, first_of_sky, of_sky, extended, profiles)
 };
 
 }  // namespace lumicut

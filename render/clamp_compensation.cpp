@@ -21,7 +21,7 @@ struct ClampCompensation::Search {
     float travelled = 0.0f;  // from there to the ray's origin
     Rgb absorption{};        // on the ray's way, for each unit of length
     uint32_t passages = 0;
-    Rgb gloss{};         // the part of `weight` that virtual lights of bounced light leave to it
+    Rgb gloss{};         // the part of `weight` that virtual lights of bounced light and of the sky leave to it
     float share = 1.0f;  // of what it brings, that counts: its point has several
   };
   std::vector<RayHit> rays;
@@ -33,12 +33,13 @@ struct ClampCompensation::Search {
 };
 
 ClampCompensation::ClampCompensation(const Scene& scene, const Clamp& clamp, const NearbyLights* nearby, bool spheres,
-                                     bool trace_gloss, bool direct, uint64_t seed)
+                                     bool trace_gloss, const EvenSky* sky, bool direct, uint64_t seed)
     : scene_(scene),
       clamp_(clamp),
       nearby_(nearby),
       spheres_(spheres),
       trace_gloss_(trace_gloss),
+      sky_(sky),
       direct_(direct),
       seed_(seed),
       light_surfaces_(scene, LightSurfaces::RaysOf::paths) {}
@@ -59,6 +60,13 @@ void ClampCompensation::find_lights(const Search& search, size_t ray, TracedPoin
     if (share > 0.0f)
       hits.add(c.weight * seen.radiance * (share * c.share), c.pixel, scene_.lights()[seen.light].group);
   });
+}
+
+void ClampCompensation::find_sky(const Search& search, size_t ray, TracedPoints& hits) const {
+  const Search::Carried& c = search.carried[ray];
+  const Vec3f& direction = search.rays[ray].ray.dir;
+  if (!(max_component(c.gloss) > 0.0f) || !sky_->has(direction)) return;
+  hits.add(c.weight * c.gloss * scene_.environment_radiance(direction) * c.share, c.pixel, scene_.environment().group);
 }
 
 void ClampCompensation::find_surface(Search& search, size_t ray, TracedPoints& hits) const {
@@ -138,7 +146,10 @@ void ClampCompensation::trace(const ShadePoints& points, uint32_t level, std::sp
     for (size_t i = 0; i < search.rays.size(); ++i) {
       if (i % 4096 == 0) progress.check();
       if (!light_surfaces_.empty()) find_lights(search, i, hits);
-      if (search.rays[i].hit.geom != kNoId) find_surface(search, i, hits);
+      if (search.rays[i].hit.geom != kNoId)
+        find_surface(search, i, hits);
+      else if (sky_ != nullptr)
+        find_sky(search, i, hits);
     }
     search.rays = std::exchange(search.next_rays, {}), search.carried = std::exchange(search.next_carried, {});
   }

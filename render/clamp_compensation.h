@@ -10,6 +10,7 @@
 #include "render/clamp.h"
 #include "render/nearby_lights.h"
 #include "render/specular_chain.h"
+#include "render/traced_gloss.h"
 #include "scene/scene.h"
 
 namespace lumicut {
@@ -17,10 +18,10 @@ namespace lumicut {
 class ClampCompensation {
  public:
   // `nearby`: samples what the clamp takes from emitters with extent; null: rays alone bring it. `spheres`: virtual lights
-  // on surfaces are, and lose nothing by it. `trace_gloss`: rays bring a part of the gloss of bounced light. `direct`: of
-  // what rays find, what shines alone. All outlive this.
+  // on surfaces are, and lose nothing by it. `trace_gloss`: rays bring a part of the gloss of bounced light, and of what
+  // `sky` has of the environment; null: nothing. `direct`: of what rays find, what shines alone. All outlive this.
   ClampCompensation(const Scene& scene, const Clamp& clamp, const NearbyLights* nearby, bool spheres, bool trace_gloss,
-                    bool direct, uint64_t seed);
+                    const EvenSky* sky, bool direct, uint64_t seed);
 
   // Rays from each point (unless they are cut short by chance, or the point is black): as many as `rays` has for its pixel,
   // or one where it is empty. `level` counts the surfaces since the camera. Appends to `hits`. Deterministic: numbers belong to the places of points. Throws Error(cancelled).
@@ -30,6 +31,7 @@ class ClampCompensation {
  private:
   struct Search;  // of one call
   void find_lights(const Search& search, size_t ray, TracedPoints& hits) const;
+  void find_sky(const Search& search, size_t ray, TracedPoints& hits) const;
   void find_surface(Search& search, size_t ray, TracedPoints& hits) const;
   // Share of what a ray finds at `position` that a virtual light there would lose.
   float lost_at(const Search& search, const Vec3f& position, float distance) const;
@@ -37,7 +39,9 @@ class ClampCompensation {
   const Scene& scene_;
   const Clamp& clamp_;
   const NearbyLights* const nearby_;
-  const bool spheres_, trace_gloss_, direct_;
+  const bool spheres_, trace_gloss_;
+  const EvenSky* const sky_;
+  const bool direct_;
   const uint64_t seed_;
   LightSurfaces light_surfaces_;
 };

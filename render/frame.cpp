@@ -256,13 +256,34 @@ class Batch {
   void add_light(const ShadePoints& points, std::vector<std::vector<Rgb>>& light, ShadeContext context, bool residual,
                  uint32_t level, const std::vector<bool>* surely) {
     if (points.size() == 0) return;
-    std::optional<ShadePoints> dimmed;
+    // Points some of whose gloss rays bring, and the others; where there are no such points, `points` are the others.
+    Part glossy, dimmed, others;
+    const bool trace = std::any_of(methods_.begin(), methods_.end(), [](const GroupMethod& m) { return m.traces(); });
+    for (size_t i = 0; trace && i < points.size(); ++i) {
+      const SurfacePoint point = points.get(i);
+      const bool sure = surely != nullptr && (*surely)[i];
+      if (!(traced_gloss(point) > 0.0f)) {
+        others.push(point, sure);
+        continue;
+      }
+      glossy.push(point, sure), dimmed.push(without_traced_gloss(point), sure);
+    }
+    const bool apart = glossy.points.size() > 0;
+    for (Part* part : {&glossy, &dimmed, &others}) part->points.finish();
+    const auto shade = [&](const Integrator* method, const ShadePoints& of, const std::vector<bool>* sure, size_t g) {
+      if (method != nullptr) add_light(*method, of, light[g], context, residual, level, sure);
+    };
+    const auto shade_part = [&](const Integrator* method, const Part& part, size_t g) {
+      if (part.points.size() > 0) shade(method, part.points, surely != nullptr ? &part.surely : nullptr, g);
+    };
     for (size_t g = 0; g < methods_.size(); ++g) {
-      if (methods_[g].method != nullptr)
-        add_light(*methods_[g].method, points, light[g], context, residual, level, surely);
-      if (methods_[g].bounced == nullptr) continue;
-      if (!dimmed) dimmed = without_traced_gloss(points);
-      add_light(*methods_[g].bounced, *dimmed, light[g], context, residual, level, surely);
+      const GroupMethod& m = methods_[g];
+      if (!apart || !m.traces()) {
+        shade(m.method, points, surely, g);
+        continue;
+      }
+      shade_part(m.method, others, g);
+      shade_part(m.others, glossy, g), shade_part(m.traced, dimmed, g);
     }
   }
 
@@ -383,6 +404,11 @@ class Batch {
   struct Pixel {
     uint32_t x, y;
   };
+  struct Part {
+    ShadePoints points;
+    std::vector<bool> surely;
+    void push(const SurfacePoint& point, bool sure) { points.push(point), surely.push_back(sure); }
+  };
   const Scene& scene_;
   const std::span<const GroupMethod> methods_;
   const FrameOptions& options_;
@@ -433,7 +459,7 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
   const std::vector<Rect> tiles = frame_tiles(options);
   size_t batch_size = 1;
   for (const GroupMethod& m : methods)
-    for (const Integrator* method : {m.method, m.bounced})
+    for (const Integrator* method : {m.method, m.traced, m.others})
       if (method != nullptr) batch_size = std::max(batch_size, method->batch_size());
   // Batches hold consecutive tiles, and depend on the integrator's wish alone: never on the number of threads.
   std::vector<std::pair<size_t, size_t>> batches;
@@ -455,8 +481,8 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
     seen_lamps.emplace(scene, LightSurfaces::RaysOf::camera);
   std::optional<ClampCompensation> compensation;
   if (light.compensated != nullptr)
-    compensation.emplace(scene, *light.compensated, light.nearby, light.spheres, light.trace_gloss, options.direct,
-                         options.seed);
+    compensation.emplace(scene, *light.compensated, light.nearby, light.spheres, light.trace_gloss, light.sky,
+                         options.direct, options.seed);
   context.progress.begin("render", size_t{options.crop.width()} * options.crop.height());
   tbb::parallel_for(
       tbb::blocked_range<size_t>(0, batches.size(), 1),

@@ -10,6 +10,7 @@
 #include "integrators/integrator.h"
 #include "render/clamp.h"
 #include "render/nearby_lights.h"
+#include "render/traced_gloss.h"
 
 namespace lumicut {
 
@@ -41,8 +42,10 @@ std::vector<Rect> frame_tiles(const FrameOptions& options);
 struct GroupMethod {
   uint32_t group;
   const Integrator* method;  // null: the group has no virtual lights
-  const Integrator* bounced =
-      nullptr;  // of its virtual lights of bounced light, where rays bring a part of their gloss
+  // Where rays bring a part of the gloss of some lights, those lights and the others apart: of points with such gloss.
+  const Integrator* traced = nullptr;
+  const Integrator* others = nullptr;
+  bool traces() const { return traced != nullptr; }
 };
 
 // What brings light beside the virtual lights. All outlive the frame.
@@ -52,6 +55,7 @@ struct FrameLight {
   std::span<const uint8_t> rays = {};    // of those, from each point of a pixel of the crop; none: one
   bool spheres = false;                  // virtual lights are, and lose nothing by it
   bool trace_gloss = false;              // rays bring a part of the gloss of bounced light [traced_gloss.h]
+  const EvenSky* sky = nullptr;          // and of this of the environment
 };
 
 // Light groups that something of the scene belongs to that emits, rising.

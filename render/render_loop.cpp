@@ -38,27 +38,36 @@ FrameLight RenderLoop::frame_light(const Prepared& prepared) const {
   light.nearby = prepared.nearby.get();
   if (prepared.params->common().compensate && preparation_.entry.light_source == LightSource::virtual_lights)
     light.compensated = prepared.clamp.get();
-  light.trace_gloss = light.compensated != nullptr && prepared.params->common().trace_gloss && may_trace_gloss(scene_);
+  light.trace_gloss = light.compensated != nullptr && prepared.params->common().trace_gloss &&
+                      prepared.vpls->light_paths > 0 && may_trace_gloss(scene_);
+  if (light.trace_gloss && sky_ && prepared.vpls->of_sky > 0) light.sky = &*sky_;
   light.spheres = sphere_scale(prepared.params->common()) > 0.0f;
   return light;
 }
 
 std::vector<GroupMethod> RenderLoop::methods(const Prepared& prepared, std::vector<OfGroup>& of_groups,
                                              Progress& progress, Stats& stats) const {
-  const bool trace_gloss = frame_light(prepared).trace_gloss;
-  const std::vector<uint32_t> all_light{0}, &groups = film_.groups().empty() ? all_light : film_.groups();
-  const bool direct = options_.direct && prepared.vpls->light_paths > 0;
-  if (film_.groups().empty() && !trace_gloss && !direct) return {{0, prepared.method.get()}};
+  const FrameLight rays = frame_light(prepared);
+  const bool by_group = !film_.groups().empty(), trace_gloss = rays.trace_gloss;
+  const std::vector<uint32_t> all_light{0}, &groups = by_group ? film_.groups() : all_light;
+  const bool direct = options_.direct && prepared.vpls->light_paths > 0, as_prepared = !by_group && !direct;
+  if (as_prepared && !trace_gloss) return {{0, prepared.method.get()}};
   of_groups.clear();
   of_groups.resize(groups.size());
   const VplSet& set = prepared.standing_off;
-  for (OfGroup& of : of_groups) of.lights.profiles = of.bounced_lights.profiles = set.profiles;
+  for (OfGroup& of : of_groups)
+    of.lights.profiles = of.traced_lights.profiles = of.other_lights.profiles = set.profiles;
+  const auto traced = [&](size_t i) {
+    if (i >= set.direct) return true;
+    return rays.sky != nullptr && i - set.first_of_sky < set.of_sky && rays.sky->has(-set.lights[i].normal);
+  };
   for (size_t i = 0; i < (direct ? set.direct : set.lights.size()); ++i) {
     auto at = groups.begin();
-    if (!film_.groups().empty()) at = std::lower_bound(groups.begin(), groups.end(), set.lights[i].group);
-    if (at == groups.end() || (!film_.groups().empty() && *at != set.lights[i].group)) continue;
+    if (by_group) at = std::lower_bound(groups.begin(), groups.end(), set.lights[i].group);
+    if (at == groups.end() || (by_group && *at != set.lights[i].group)) continue;
     OfGroup& of = of_groups[static_cast<size_t>(at - groups.begin())];
-    (trace_gloss && i >= set.direct ? of.bounced_lights : of.lights).lights.push_back(set.lights[i]);
+    if (!as_prepared) of.lights.lights.push_back(set.lights[i]);
+    if (trace_gloss) (traced(i) ? of.traced_lights : of.other_lights).lights.push_back(set.lights[i]);
   }
   const auto prepare = [&](const VplSet& lights, std::unique_ptr<Integrator>& method) {
     progress.check();
@@ -69,8 +78,10 @@ std::vector<GroupMethod> RenderLoop::methods(const Prepared& prepared, std::vect
   std::vector<GroupMethod> all;
   for (size_t g = 0; g < of_groups.size(); ++g) {
     OfGroup& of = of_groups[g];
-    prepare(of.lights, of.method), prepare(of.bounced_lights, of.bounced);
-    all.push_back({groups[g], of.method.get(), of.bounced.get()});
+    if (!as_prepared) prepare(of.lights, of.method);
+    prepare(of.traced_lights, of.traced);
+    if (of.traced) prepare(of.other_lights, of.others);
+    all.push_back({groups[g], as_prepared ? prepared.method.get() : of.method.get(), of.traced.get(), of.others.get()});
   }
   return all;
 }
@@ -84,6 +95,7 @@ Params RenderLoop::as_wanted(Params params) const {
 void RenderLoop::run(Progress& progress, Stats& stats, const std::function<void(const Rect&)>& tile_done) {
   const CurrentWork current(&progress);
   progress.check();
+  if (preparation_.params.common().trace_gloss && !scene_.environment().black()) sky_.emplace(scene_);
   if (progressive_) return render_iterations(progress, stats, tile_done);
   preparation_.prepare(scene_, scene_owner_, as_wanted(preparation_.params), progress, stats, whole_frame());
   const Prepared& prepared = *preparation_.prepared;

@@ -49,11 +49,11 @@ class RenderLoop {
   }
 
  private:
-  // What renders: the method as it was prepared, or one for the lights of each group; where gloss is traced, one more
-  // for bounced light.
+  // What renders: the method as it was prepared, or one for the lights of each group; where gloss is traced, two more, for
+  // the lights whose gloss rays bring and for the others.
   struct OfGroup {
-    VplSet lights, bounced_lights;
-    std::unique_ptr<Integrator> method, bounced;
+    VplSet lights, traced_lights, other_lights;
+    std::unique_ptr<Integrator> method, traced, others;
   };
   void render_iterations(Progress& progress, Stats& stats, const std::function<void(const Rect&)>& tile_done);
   FrameSize whole_frame() const { return {options_.width, options_.height}; }
@@ -73,6 +73,7 @@ class RenderLoop {
   mutable std::mutex film_mutex_;  // of iterations: pixels change while others read them
   mutable std::mutex state_mutex_;
   State state_;
+  std::optional<EvenSky> sky_;  // where rays bring its gloss
 };
 
 }  // namespace lumicut

@@ -1,5 +1,5 @@
-// Gloss that is left to rays: near its mirror direction a smooth surface sees few virtual lights of bounced light, each as
-// a blot; a ray by the lobe finds a place that all of them light. [Davidovič et al. 2010 split
+// Gloss that is left to rays: near its mirror direction a smooth surface sees few virtual lights of bounced light and of
+// the sky, each as a blot; a ray by the lobe finds a place that all of them light, or the sky itself. [Davidovič et al. 2010 split
 // light transport likewise, into what a global solution shows well and what is gathered locally]
 #pragma once
 
@@ -11,17 +11,22 @@
 
 namespace lumicut {
 
-// Up to the one α rays bring all (a roughness of .35), from the other on none (.55).
-inline constexpr float kTracedAlpha = 0.12f, kLeftAlpha = 0.3f;
+// Up to the one α rays bring all (a roughness of .22), from the other on none (.35).
+inline constexpr float kTracedAlpha = 0.05f, kLeftAlpha = 0.12f;
+// And where rays follow the lobe with such a chance: seldom, they would bring more noise than blots are.
+inline constexpr float kTracedShare = 0.2f, kLeftShare = 0.05f;
 // The α of a cosine lobe about as wide.
 inline float alpha_of_exponent(float n) { return std::sqrt(2.0f / (n + 2.0f)); }
 
-// Share of the glossy lobe's bounced light that rays bring.
+// Share of the glossy lobe's light, bounced or of the sky, that rays bring.
 inline float traced_gloss(const SurfacePoint& p) {
   if (!(max_component(p.specular) > 0.0f || max_component(p.grazing) > 0.0f)) return 0.0f;
-  const float alpha = p.lobe == kCosineLobe ? alpha_of_exponent(p.shape) : p.shape;
-  const float x = std::clamp((kLeftAlpha - alpha) / (kLeftAlpha - kTracedAlpha), 0.0f, 1.0f);
-  return x * x * (3.0f - 2.0f * x);
+  const auto smooth = [](float x, float none, float all) {
+    x = std::clamp((x - none) / (all - none), 0.0f, 1.0f);
+    return x * x * (3.0f - 2.0f * x);
+  };
+  const float of_alpha = smooth(p.lobe == kCosineLobe ? alpha_of_exponent(p.shape) : p.shape, kLeftAlpha, kTracedAlpha);
+  return of_alpha > 0.0f ? of_alpha * smooth(PointBsdf(p).glossy_share(), kLeftShare, kTracedShare) : 0.0f;
 }
 
 // Whether any surface may have such a share; where, textures may decide.
@@ -34,19 +39,30 @@ inline bool may_trace_gloss(const Scene& scene) {
   });
 }
 
-// The points without that share: what virtual lights of bounced light shade.
-inline ShadePoints without_traced_gloss(const ShadePoints& points) {
-  ShadePoints rest;
-  rest.reserve(points.size());
-  for (size_t i = 0; i < points.size(); ++i) {
-    SurfacePoint p = points.get(i);
-    const float left = 1.0f - traced_gloss(p);
-    p.specular *= left, p.grazing *= left;
-    rest.push(p);
-  }
-  rest.finish();
-  return rest;
+// The point without that share: what virtual lights of such light shade.
+inline SurfacePoint without_traced_gloss(SurfacePoint p) {
+  const float left = 1.0f - traced_gloss(p);
+  p.specular *= left, p.grazing *= left;
+  return p;
 }
+
+// The part of the sky that rays bring: without suns and lamps, which they would meet by chance.
+class EvenSky {
+ public:
+  explicit EvenSky(const Scene& scene) : scene_(scene) {
+    const Environment& sky = scene.environment();
+    const Rgb mean = sky.texture < 0 ? Rgb{1, 1, 1} : scene.textures()[sky.texture].average();
+    if (!sky.reach.limited()) brightest_ = kBrightest * luminance(sky.color * mean);
+  }
+  bool has(const Vec3f& direction) const {
+    return brightest_ > 0.0f && luminance(scene_.environment_radiance(direction)) <= brightest_;
+  }
+
+ private:
+  static constexpr float kBrightest = 2.0f;  // over the mean of the map
+  const Scene& scene_;
+  float brightest_ = 0.0f;
+};
 
 // Of what a sample towards the direction carries: the part, for each channel, that is of this share.
 inline Rgb traced_part(const SurfacePoint& p, const Vec3f& direction) {

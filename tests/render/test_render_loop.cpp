@@ -104,13 +104,16 @@ TEST(RenderLoop, GroupsOfLightAddUpToAllLight) {
   EXPECT_LT(difference, 0.02 * total);
 }
 
-// Each group then has two methods: one for what bounced, whose gloss rays bring.
+// Each group then has methods for what bounced, whose gloss rays bring, and for the rest.
 TEST(RenderLoop, GroupsAddUpWhereGlossIsTraced) {
   RoomRender one("exhaustive"), apart("exhaustive");
   for (RoomRender* r : {&one, &apart}) {
     std::vector<Light> lights = r->scene->lights();
     lights[1].group = 3;
     r->scene->set_lights(lights);
+    std::vector<Material> materials = r->scene->materials();
+    materials[3].shininess = 600;
+    r->scene->set_materials(materials);
     Progress progress;
     r->scene->commit(progress);
     r->preparation.params.set("compensate", "true"), r->preparation.params.set("trace_gloss", "true");

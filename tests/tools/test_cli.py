@@ -35,7 +35,7 @@ class Info(Cli):
         self.assertEqual({name for name in traits if "virtual_lights" not in traits[name]}, {"path_tracer"})
         self.assertEqual({name for name in traits if "saved_state" in traits[name]}, {"wspd"})
         self.assertEqual({name for name in traits if "all_lights" in traits[name]}, {"exhaustive"})
-        self.assertEqual(presets["lightcuts"]["good"], "vpls=3000 error=0.05 compensate=true importance=true")
+        self.assertEqual(presets["lightcuts"]["good"], "vpls=3000 error=0.05 compensate=true importance=true trace_gloss=true")
         self.assertIn("radiance", [c["name"] for c in info["channels"]])
         text = lumicut("info").stdout
         for name in integrators:
