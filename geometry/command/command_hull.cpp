@@ -120,7 +120,8 @@ Command add_hull(CLI::App& app) {
                                      "Convex hull of a sliding window on a simple chain: reads x,y (inserts), - "
                                      "(deletes the oldest) and ? (tells the hull), a line each");
   command->add_option("stream", a->stream, "File (-: standard input, answered line by line)");
-  command->add_option("--window", a->window, "Most points: older ones leave by themselves (0: no limit)");
+  command->add_option("--window", a->window, "Most points: older ones leave by themselves (0: no limit)")
+      ->check(CLI::NonNegativeNumber);
   add_picture(*command, a->picture, a->size, "Picture of the last window and its hull, .svg or .png");
   command->add_flag("--summary", a->summary, "Numbers of points and hull vertices alone");
   command->add_flag("--check-simple", a->check_simple,

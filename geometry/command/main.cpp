@@ -15,13 +15,16 @@
 #include "io/file_error.h"
 #include "io/picture_ending.h"
 #include "io/standard_streams.h"
+#include "io/text_lines.h"
 
 namespace lumicut {
 
 std::istringstream open_text(const std::string& path) {
   if (path == "-")
     return std::istringstream(std::string(std::istreambuf_iterator<char>(std::cin), std::istreambuf_iterator<char>()));
-  return std::istringstream(io::read_whole_file(path));
+  std::string text = io::read_whole_file(path);
+  io::refuse_utf16(text, path);
+  return std::istringstream(std::move(text));
 }
 
 void check_output(const std::string& path) {
@@ -117,12 +120,19 @@ int run(int argc, char** argv) {
   CLI::App app{"Ball trees, sliding hulls, hitting sets and epsilon-nets for disks, face clusters on deforming meshes"};
   app.name("lumicut-geometry");
   app.require_subcommand(1);
+  app.set_version_flag("--version", "lumicut-geometry " LUMICUT_VERSION_TEXT);
   std::vector<std::pair<CLI::App*, Command>> commands;
   for (const auto add :
        {add_balltree, add_hitting_set, add_hull, add_independent_set, add_instance, add_net, add_recluster}) {
     Command command = add(app);
     commands.emplace_back(app.get_subcommands({}).back(), std::move(command));
   }
+  // An empty one is what a script makes of a variable that is not set.
+  const CLI::Validator not_empty([](const std::string& text) { return std::string(text.empty() ? "is empty" : ""); },
+                                 "");
+  for (CLI::App* command : app.get_subcommands({}))
+    for (CLI::Option* option : command->get_options())
+      if (option->get_items_expected_max() > 0) option->check(not_empty);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -65,6 +65,15 @@ class GeometryCommand(unittest.TestCase):
         self.refused("independent-set", "--disks", good, "--start", self.write("s.csv", ["0", "1.5"]), says=["s.csv, line 2", "1.5"])
         self.refused("hitting-set", "--points", points, "--disks", good, says=["points.csv, line 2", "y is -1e71"])
 
+    def test_what_scripts_and_other_programs_make_is_named(self):
+        points = self.write("p.csv", ["0,0", "1,0", "0,1"])
+        (self.folder / "wide.csv").write_bytes("0,0\n1,1\n".encode("utf-16"))
+        self.refused("balltree", self.folder / "wide.csv", says=["wide.csv: is UTF-16 text"], code=1)
+        for option in ("--picture", "--queries", "--out"):
+            self.refused("balltree", points, option, "", says=[f"{option}: is empty"])
+        self.refused("hull", points, "--window", "-1", says=["--window"])
+        self.assertRegex(run("--version").stdout, r"^lumicut-geometry \d+\.\d+\.\d+\n$")
+
     def test_a_folder_that_cannot_be_made_is_named(self):
         mesh = self.write("m.obj", ["v 0 0 0", "v 1 0 0", "v 0 1 0", "f 1 2 3"])
         for out in (mesh, mesh / "below"):
