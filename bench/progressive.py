@@ -114,7 +114,7 @@ def coverage(options):
         shares, errors, means = [], [], []
         for seed in range(1, options.seeds + 1):
             path = options.folder / f"{options.name}.{passes}.seed{seed}.exr"
-            render(options, path, *options.arguments, "--passes", passes, "--seed", seed, "--layers", ",".join(("radiance",) + layers),
+            render(options, path, *options.arguments, "--passes", passes, "--seed", seed, "--layers", ",".join(dict.fromkeys(("radiance", *layers))),
                    "--denoise" if options.denoised else "--no-denoise")
             image = load(path, layers[0]) @ weights
             side = luminance.shape[0] // image.shape[0]  # of the truth's pixels in one of these

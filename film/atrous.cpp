@@ -13,6 +13,7 @@ using V = hn::Vec<D>;
 
 // Relative tolerances of the inverse depth: of itself, and of how much it changes on the way.
 constexpr float kOfDepth = 0.02f, kOfSlope = 0.2f;
+constexpr float kOfEight = 0.125f;  // distances end at 8
 
 // Neighbouring pixels, and their weights of others. What does not depend on the neighbour is computed once.
 struct Pixels {
@@ -25,10 +26,11 @@ struct Pixels {
     const V slope = hn::Mul(hn::Set(d, kOfSlope * step), hn::Add(hn::Abs(along_x), hn::Abs(along_y)));
     const V tolerance = hn::MulAdd(hn::Set(d, kOfDepth), inverse_depth, hn::Add(slope, hn::Set(d, 1e-20f)));
     per_depth = hn::Div(hn::Set(d, 0.70710678f), tolerance);
-    per_loosened = hn::Div(hn::Set(d, 0.125f), hn::LoadU(d, guide.row(Guide::kLoosened, y) + x));
+    per_loosened = hn::Div(hn::Set(d, kOfEight), hn::LoadU(d, guide.row(Guide::kLoosened, y) + x));
   }
 
-  // About exp(−distance): (1 − distance/8)⁸, which ends at 8.
+  // About exp(−distance): (1 − distance/8)⁸, which ends at 8. `kEither`: the looser of both pixels decides.
+  template <bool kEither = false>
   HWY_INLINE V Weight(D d, const PaddedPlanes& guide, ptrdiff_t x, size_t y, float dx, float dy) const {
     const V plane = hn::MulAdd(along_x, hn::Set(d, dx), hn::MulAdd(along_y, hn::Set(d, dy), inverse_depth));
     const V depth = hn::Mul(hn::Sub(plane, hn::LoadU(d, guide.row(Guide::kInverseDepth, y) + x)), per_depth);
@@ -37,13 +39,16 @@ struct Pixels {
       const V away = hn::Sub(feature[k], hn::LoadU(d, guide.row(k, y) + x));
       unlike = hn::MulAdd(away, away, unlike);
     }
-    V w = hn::Max(hn::Zero(d), hn::NegMulAdd(unlike, per_loosened, hn::Set(d, 1.0f)));
+    V per = per_loosened;
+    if constexpr (kEither)
+      per = hn::Min(per, hn::Div(hn::Set(d, kOfEight), hn::LoadU(d, guide.row(Guide::kLoosened, y) + x)));
+    V w = hn::Max(hn::Zero(d), hn::NegMulAdd(unlike, per, hn::Set(d, 1.0f)));
     w = hn::Mul(w, w), w = hn::Mul(w, w);
     return hn::Mul(w, w);
   }
 };
 
-template <size_t kPlanes>
+template <size_t kPlanes, bool kEither>
 HWY_INLINE void FilterRows(const PaddedPlanes& guide, const PaddedPlanes& in, size_t step, size_t begin, size_t end,
                            PaddedPlanes& out) {
   const D d;
@@ -61,8 +66,9 @@ HWY_INLINE void FilterRows(const PaddedPlanes& guide, const PaddedPlanes& in, si
           const float binomial = i != 0 && j != 0 ? 1.0f : 2.0f;
           const auto row = static_cast<size_t>(v);
           const ptrdiff_t column = static_cast<ptrdiff_t>(x) + j * s;  // below 0 in the margin
-          const V w = hn::Mul(hn::Set(d, binomial), pixels.Weight(d, guide, column, row, static_cast<float>(j * s),
-                                                                  static_cast<float>(i * s)));
+          const V w = hn::Mul(
+              hn::Set(d, binomial),
+              pixels.Weight<kEither>(d, guide, column, row, static_cast<float>(j * s), static_cast<float>(i * s)));
           weights = hn::Add(weights, w);
           for (size_t k = 0; k < kPlanes; ++k) sum[k] = hn::MulAdd(w, hn::LoadU(d, in.row(k, row) + column), sum[k]);
         }
@@ -74,11 +80,11 @@ HWY_INLINE void FilterRows(const PaddedPlanes& guide, const PaddedPlanes& in, si
 
 void AtrousRows(const PaddedPlanes& guide, const PaddedPlanes& in, size_t step, size_t begin, size_t end,
                 PaddedPlanes& out) {
-  FilterRows<kFiltered>(guide, in, step, begin, end, out);
+  FilterRows<kFiltered, false>(guide, in, step, begin, end, out);
 }
 void AtrousFirstRows(const PaddedPlanes& guide, const PaddedPlanes& in, size_t step, size_t begin, size_t end,
                      PaddedPlanes& out) {
-  FilterRows<kFirstFiltered>(guide, in, step, begin, end, out);
+  FilterRows<kFirstFiltered, true>(guide, in, step, begin, end, out);
 }
 
 void SupportRows(const PaddedPlanes& guide, size_t begin, size_t end, PaddedPlanes& out) {

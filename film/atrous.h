@@ -38,7 +38,8 @@ struct Guide {
   static constexpr float kFar = 1e4f;  // of features in the margin: like nothing
 };
 
-// How many planes are filtered at once: all, or the first few.
+// How many planes are filtered at once: all, or the first few, where the looser of two pixels decides how alike they are:
+// what stands on an edge goes to both sides.
 inline constexpr size_t kFiltered = 8, kFirstFiltered = 3;
 
 // Rows [begin, end): of `in` into `out`.

@@ -96,7 +96,7 @@ def cases():
     yield "clear coat 0.03 alone", principled("Lacquer", **{"Base Color": (0, 0, 0), SPECULAR: 0.0, "Roughness": 1.0, COAT: 1.0, COAT_ROUGHNESS: 0.03})[0], False, 0.1
     yield "glass", glass("Glass", 0.0), False, 0.025
     yield "rough glass 0.2", glass("Frosted", 0.2), False, 0.035
-    yield "rough glass 0.5", glass("Frosted", 0.5), False, 0.065
+    yield "rough glass 0.5", glass("Frosted", 0.5), False, 0.075
     yield "rough glass 0.9", glass("Frosted", 0.9), False, 0.33
     yield "rough glass 0.5, single scattering", glass("Frosted", 0.5, multi=False), False, 0.15
     yield "coloured glass", glass("Bottle", 0.0, (0.5, 0.8, 0.6)), False, 0.025
@@ -139,8 +139,8 @@ def measure():
     with h.quiet():
         h.set_cycles(spp, 24)
         cycles = h.radiance(h.render())
-        h.set_lumicut("path_tracer", 64, max_depth=24)
-        scene.lumicut.path_tracer.samples = max(1, spp // 64)
+        h.set_lumicut("path_tracer", 256, max_depth=24)
+        scene.lumicut.path_tracer.samples = max(1, spp // 256)
         ours = h.radiance(h.render())
     if os.environ.get("LUMICUT_MATERIAL_IMAGES"):
         np.savez(os.environ["LUMICUT_MATERIAL_IMAGES"], ours=ours, cycles=cycles)
