@@ -5,6 +5,7 @@ Arrays are filled by foreach_get in the type that Blender stores, which is a mem
 each set of materials; its instances are transforms.
 """
 import bpy
+import mathutils
 import numpy as np
 
 from . import lights, linking, mesh_attributes, program_values, programs, strands, worlds
@@ -401,7 +402,7 @@ class Collector:
     def _add_mesh(self, instance, ob, override):
         mesh = ob.data
         slots = self._slots(ob, override)
-        for numbers, mask in self._variants(ob, slots, lambda: self._is_pane(mesh, instance.matrix_world)):
+        for numbers, mask in self._variants(ob, slots, lambda: self._is_noted_pane(ob, mesh, instance.matrix_world)):
             self._add_variant(instance, ob, mesh, slots, numbers, mask)
 
     def _add_hair(self, instance, ob, override):
@@ -593,6 +594,23 @@ class Collector:
         is_open, extents = self._sheets[key]
         thickness, width, _ = sorted(extents * np.abs(matrix.to_scale()))
         return is_open or thickness <= 0.1 * width
+
+    def _is_noted_pane(self, ob, mesh, matrix):
+        """The same, with a note where Cycles shows what lies behind a sheet darker."""
+        pane = self._is_pane(mesh, matrix)
+        if self._sheets[mesh.as_pointer()][0] and self._shows_its_back(mesh, matrix):
+            self.report.note(ob.name, "Sheets of glass whose back the camera sees: Cycles takes that side for the inside of the glass, and what shines through is half as bright there; turn the normals or give the sheet a thickness")
+        return pane
+
+    def _shows_its_back(self, mesh, matrix):
+        camera = self.depsgraph.scene.camera
+        if camera is None or not mesh.polygons:
+            return False
+        count = len(mesh.polygons)
+        normals = fetch(mesh.polygons, "normal", count, 3, np.float32) * fetch(mesh.polygons, "area", count, 1, np.float32).reshape(-1, 1)
+        normal = matrix.to_3x3().inverted_safe().transposed() @ mathutils.Vector(normals.sum(axis=0))
+        centre = matrix @ mathutils.Vector(vertex_positions(mesh).mean(axis=0))
+        return normal.dot(camera.evaluated_get(self.depsgraph).matrix_world.translation - centre) < 0
 
     def _hidden_from(self, ob):
         """Kinds of rays that do not see an object: its own setting, and its collection's Indirect Only."""

@@ -434,6 +434,16 @@ class MaterialTrees(unittest.TestCase):
         self.assertEqual(passes, {"Plane": True, ball.name: False, "Flat": True})
         self.assertTrue(any("Glass bodies" in n and "Bottle" in n for n in notes))
 
+    def test_a_sheet_of_glass_is_noted_where_the_camera_sees_its_back(self):
+        m = h.material("Pane")
+        h.shader(m, "ShaderNodeBsdfGlass")
+        ob = h.add_plane(material=m)
+        for turn, noted in ((0, False), (math.pi, True)):
+            ob.rotation_euler.x = turn
+            bpy.context.view_layer.update()
+            _, notes = collected()
+            self.assertEqual(any("whose back the camera sees" in n and ob.name in n for n in notes), noted)
+
     def window(self, output, glass_first=True, kind="ShaderNodeBsdfGlass"):
         m = h.material("Window")
         mix = h.shader(m, "ShaderNodeMixShader")
