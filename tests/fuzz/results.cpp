@@ -10,6 +10,8 @@ using namespace lumicut;
 // main.cpp has them, which is not part of this program.
 volatile std::sig_atomic_t tools::interrupted = 0;
 void tools::catch_interrupts() {}
+tools::NothingToLose::NothingToLose() = default;
+tools::NothingToLose::~NothingToLose() = default;
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const fuzz::Folder folder;
