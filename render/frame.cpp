@@ -143,6 +143,7 @@ class Batch {
     light_.assign(methods_.size(), std::vector<Rgb>(pixels_.size()));
     counts_.assign(pixels_.size(), {});
     if (options_.denoise) residual_.assign(pixels_.size(), {});
+    if (options_.illuminance) illuminance_.assign(pixels_.size(), 0.0f);
     if (options_.occlusion > 0.0f) return occlude(context);
     shade_levels(points_, nearby, compensation, light_, context, options_.denoise);
     for (size_t i = 0; i < seen_.light.size(); ++i) {
@@ -169,7 +170,6 @@ class Batch {
     white.finish();
     std::vector<std::vector<Rgb>> shown(methods_.size(), std::vector<Rgb>(pixels_.size()));
     shade_levels(white, nearby, compensation, shown, context, false);
-    illuminance_.assign(pixels_.size(), 0.0f);
     for (const auto& of_group : shown)
       for (size_t p = 0; p < pixels_.size(); ++p)
         illuminance_[p] += kLumenPerWatt * std::numbers::pi_v<float> * luminance(of_group[p]);

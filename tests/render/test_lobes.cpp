@@ -74,6 +74,22 @@ TEST(Lobes, DirectLightIsThatOfPathsWithoutASurfaceBetween) {
   }
 }
 
+// It was read where nothing had been written.
+TEST(Lobes, FramesOfOcclusionHaveNoIlluminance) {
+  const auto scene = room();
+  Preparation preparation(*find_integrator("exhaustive"));
+  FrameOptions frame = test::frame_of({.width = kWidth, .height = kHeight});
+  frame.occlusion = 1, frame.illuminance = true;
+  RenderLoop loop(preparation, *scene, nullptr, frame, {}, {});
+  Progress progress;
+  Stats stats;
+  Arena(0).run([&] { loop.run(progress, stats, [](const Rect&) {}); });
+  loop.read([&](const Film& film) {
+    for (uint32_t y = 0; y < kHeight; ++y)
+      for (uint32_t x = 0; x < kWidth; ++x) EXPECT_EQ(*film.pixel(Channel::illuminance, x, y), 0);
+  });
+}
+
 TEST(Lobes, OcclusionIsTheShareOfDirectionsInWhichNothingIsNear) {
   const auto scene = room();
   EXPECT_LT(mean(render(*scene, 0, false, 100)), 0.01) << "of a closed room, but for its edges";
