@@ -3,19 +3,13 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <istream>
 
 #include "core/error.h"
+#include "core/short_text.h"
 
 namespace lumicut {
 namespace {
-
-std::string short_text(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%g", value);
-  return text;
-}
 
 // `fields`: names of the columns; none: as many as the first row of numbers has.
 // row(values, bad): bad(field, what) throws.

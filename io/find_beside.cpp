@@ -63,6 +63,11 @@ FoundFile find_beside(const std::string& file, const std::string& name) {
   return {};
 }
 
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code code;
+  return a == b || std::filesystem::equivalent(a, b, code);
+}
+
 std::string missing_file(const std::string& what, const std::string& file, const std::string& name) {
   if (name.empty()) return fmt::format("the name of the {} is empty", what);
   std::error_code code;

@@ -18,6 +18,9 @@ struct FoundFile {
 // where `name` is an absolute path of another machine, its last part beside `file`.
 FoundFile find_beside(const std::string& file, const std::string& name);
 
+// Whether two paths lead to one file, by links too.
+bool same_file(const std::string& a, const std::string& b);
+
 // Why nothing was found: "the mesh a.ply does not exist", "the name of the mesh is empty", "... is a folder".
 std::string missing_file(const std::string& what, const std::string& file, const std::string& name);
 

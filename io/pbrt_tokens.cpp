@@ -6,7 +6,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 #include <map>
 
 #include "io/file_error.h"
@@ -25,10 +24,7 @@ constexpr uint64_t kMostBytes = uint64_t{4} << 30;  // of all files together
 }  // namespace
 
 void PbrtTokens::open(const std::string& path) {
-  const auto is_this = [&](const Source& open) {
-    std::error_code code;
-    return *open.path == path || std::filesystem::equivalent(*open.path, path, code);
-  };
+  const auto is_this = [&](const Source& open) { return same_file(*open.path, path); };
   if (std::any_of(files_.begin(), files_.end(), is_this))
     fail(fmt::format("{} includes itself{}", shown(path), *files_.back().path == path ? "" : ", by way of others"));
   if (files_.size() >= kDeepest) fail(fmt::format("files include each other without end: {} deep", kDeepest));

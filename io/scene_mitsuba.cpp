@@ -121,10 +121,7 @@ class Reader {
       defaults_.emplace(text(node, "name"), text(node, "value"));
     } else if (name == "include") {
       const std::string file = found_file(node, "file", text(node, "filename"));
-      const auto is_this = [&](const std::string& open) {
-        std::error_code code;
-        return open == file || std::filesystem::equivalent(open, file, code);
-      };
+      const auto is_this = [&](const std::string& open) { return same_file(open, file); };
       if (std::any_of(opened_.begin(), opened_.end(), is_this))
         fail(node,
              fmt::format("{} includes itself{}", shown(file), is_this(opened_.back()) ? "" : ", by way of others"));

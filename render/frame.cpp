@@ -257,18 +257,19 @@ class Batch {
                  uint32_t level, const std::vector<bool>* surely) {
     if (points.size() == 0) return;
     // Points some of whose gloss rays bring, and the others; where there are no such points, `points` are the others.
+    std::vector<bool> has_gloss;
+    if (std::any_of(methods_.begin(), methods_.end(), [](const GroupMethod& m) { return m.traces(); }))
+      for (size_t i = 0; i < points.size(); ++i) has_gloss.push_back(traced_gloss(points.get(i)) > 0.0f);
+    const bool apart = std::find(has_gloss.begin(), has_gloss.end(), true) != has_gloss.end();
     Part glossy, dimmed, others;
-    const bool trace = std::any_of(methods_.begin(), methods_.end(), [](const GroupMethod& m) { return m.traces(); });
-    for (size_t i = 0; trace && i < points.size(); ++i) {
+    for (size_t i = 0; apart && i < points.size(); ++i) {
       const SurfacePoint point = points.get(i);
       const bool sure = surely != nullptr && (*surely)[i];
-      if (!(traced_gloss(point) > 0.0f)) {
+      if (has_gloss[i])
+        glossy.push(point, sure), dimmed.push(without_traced_gloss(point), sure);
+      else
         others.push(point, sure);
-        continue;
-      }
-      glossy.push(point, sure), dimmed.push(without_traced_gloss(point), sure);
     }
-    const bool apart = glossy.points.size() > 0;
     for (Part* part : {&glossy, &dimmed, &others}) part->points.finish();
     const auto shade = [&](const Integrator* method, const ShadePoints& of, const std::vector<bool>* sure, size_t g) {
       if (method != nullptr) add_light(*method, of, light[g], context, residual, level, sure);

@@ -1,11 +1,10 @@
 #include "scene/scene.h"
 
-#include <cstdio>
-
 #include "accel/validate.h"
 #include "bsdf/straight_glass.h"
 #include "core/error.h"
 #include "core/rng.h"
+#include "core/short_text.h"
 
 namespace lumicut {
 
@@ -39,12 +38,6 @@ Vec3f above_surface(Vec3f n, const SurfaceHit& hit) {
   if (const float up = dot(n, hit.geometric_normal); up < kLeast)
     n = normalize(n + hit.geometric_normal * (kLeast - up));
   return n == Vec3f{} ? hit.normal : n;
-}
-
-std::string short_text(float v) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%g", static_cast<double>(v));
-  return text;
 }
 
 std::string at(const char* what, size_t i) { return std::string(what) + "[" + std::to_string(i) + "]"; }
@@ -386,7 +379,7 @@ bool Scene::passes_light(const CandidateHit& hit) const {
     Vec3f corner = mesh.positions[t[0]];
     Vec3f edges[2] = {mesh.positions[t[1]] - corner, mesh.positions[t[2]] - corner}, dir = hit.dir;
     if (hit.inst != kNoId) {
-      const Transform& to_world = instance(hit.mesh, hit.inst - first_instance_[hit.mesh]);
+      const Transform& to_world = instance(hit.mesh, instance_index);
       corner = to_world.point(corner), edges[0] = to_world.vector(edges[0]), edges[1] = to_world.vector(edges[1]),
       dir = to_world.vector(dir);
     }
@@ -403,7 +396,7 @@ bool Scene::passes_light(const CandidateHit& hit) const {
     Rgb passed = straight_transmittance(glass, cosine);
     if (thickness_[hit.mesh] > 0.0f) {
       // Half of the way at each border, as slanted as light is inside.
-      const float size = hit.inst != kNoId ? instance(hit.mesh, hit.inst - first_instance_[hit.mesh]).scale() : 1.0f;
+      const float size = hit.inst != kNoId ? instance(hit.mesh, instance_index).scale() : 1.0f;
       const float inside = std::sqrt(std::max(0.0f, 1.0f - (1.0f - cosine * cosine) / (glass.ior * glass.ior)));
       const float way = 0.5f * size * thickness_[hit.mesh] / std::max(inside, 1e-3f);
       for (int k = 0; k < 3; ++k) passed[k] *= std::exp(-glass.absorption[k] * way);
