@@ -83,6 +83,19 @@ class PointBsdf {
     return s;
   }
 
+  // The same for a direction that something else chose; `choice` decides which lobe it is said to be of.
+  std::optional<BsdfSample> towards(const Vec3f& direction, float choice) const {
+    BsdfSample s;
+    s.direction = direction;
+    s.pdf = pdf(direction);
+    if (!(s.pdf > 0.0f)) return {};
+    const float cosine = dot(point_.normal, direction);
+    s.weight = reflectance(point_, direction) * (cosine / s.pdf);
+    const bool diffuse = choice * s.pdf < diffuse_share_ * cosine * std::numbers::inv_pi_v<float>;
+    s.flags = diffuse ? kReflected : kReflected | kGlossy;
+    return s;
+  }
+
  private:
   const SurfacePoint& point_;
   float diffuse_share_ = 1.0f;

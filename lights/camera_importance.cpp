@@ -220,7 +220,8 @@ float CameraImportance::keep(const Vec3f& position, const Vec3f& normal, BallQue
 void CameraImportance::weigh_path_starts(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
                                          const std::vector<std::vector<uint32_t>>& groups, Progress& progress) {
   const std::vector<PathVpl> lights =
-      trace_light_paths(scene, emitters, options, nullptr, kFirstLightPath, kFirstLightPath + kLightPaths, progress);
+      trace_light_paths(scene, emitters, options, nullptr, kFirstLightPath, kFirstLightPath + kLightPaths, progress)
+          .lights;
   std::vector<float> densities(lights.size());
   parallel_chunks(lights.size(), 1024, [&](size_t begin, size_t end) {
     BallQueryTree::Scratch scratch;

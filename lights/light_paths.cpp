@@ -23,6 +23,7 @@ struct LightPath {
   Vec3f disk_centre{};  // as EmittedRay has it
   float disk_radius = 0.0f;
   bool shadows = true;
+  bool thrown = false;  // by gloss, a mirror or glass
   LightReach reach{};
   // It has met nothing yet that scatters: what its lamp does not reach, it does not light, nor is stopped by.
   bool first() const { return (kind & kShadowRay) != 0; }
@@ -56,11 +57,12 @@ float scattered_by_shading_normal(const SurfaceInteraction& at, const ScatterSam
 }
 
 // Follows paths [first, last) in step, so that rays are traced in batches.
-std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
-                                 const CameraImportance* importance, uint64_t first, uint64_t last) {
+LightPaths trace_paths(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
+                       const CameraImportance* importance, uint64_t first, uint64_t last) {
   const DiscreteDistribution* starts = importance != nullptr ? &importance->path_starts() : nullptr;
   BallQueryTree::Scratch scratch;
-  std::vector<PathVpl> vpls;
+  LightPaths found;
+  std::vector<PathVpl>& vpls = found.lights;
   std::vector<LightPath> paths;
   std::vector<uint64_t> ids;
   for (uint64_t i = first; i < last; ++i) {
@@ -119,6 +121,8 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
       };
       if (!path.first() || path.reach.lights(kDiffuseRay)) {
         const Rgb received = path.flux * (lit * lit_by_shading_normal(at));
+        if (path.thrown && max_component(at.bsdf.even_color()) > 0.0f)
+          found.glints.push_back({at.position, path.origin, luminance(received)});
         leave(at.bsdf.lambertian_intensity(received));
         light.normal = -light.normal;
         leave(at.bsdf.passed_intensity(received));
@@ -127,7 +131,10 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
       if (!next) continue;
       if (path.first() && (next->flags & kStraight) == 0 && !path.reach.lights(lobe_kind(next->flags))) continue;
       if ((next->flags & kStraight) == 0 && ++path.met >= options.max_depth) continue;
-      if ((next->flags & kStraight) == 0) path.kind = kDiffuseRay, path.flux *= lit, path.disk_radius = 0.0f;
+      if ((next->flags & kStraight) == 0) {
+        path.kind = kDiffuseRay, path.flux *= lit, path.disk_radius = 0.0f;
+        path.thrown = (next->flags & (kSpecular | kGlossy)) != 0;
+      }
       path.absorption = at.bsdf.absorption_after(next->flags, path.absorption);
       path.origin = at.bsdf.origin(next->flags), path.direction = next->direction;
       path.flux = path.flux * next->weight * (next->factor * scattered_by_shading_normal(at, *next));
@@ -139,24 +146,26 @@ std::vector<PathVpl> trace_paths(const Scene& scene, const LightSampler& emitter
     ids.resize(alive);
   }
   std::stable_sort(vpls.begin(), vpls.end(), [](const PathVpl& a, const PathVpl& b) { return a.path < b.path; });
-  return vpls;
+  return found;
 }
 
 }  // namespace
 
-std::vector<PathVpl> trace_light_paths(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
-                                       const CameraImportance* importance, uint64_t first, uint64_t last,
-                                       Progress& progress) {
-  std::vector<std::vector<PathVpl>> parts((last - first + kPathsPerChunk - 1) / kPathsPerChunk);
+LightPaths trace_light_paths(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
+                             const CameraImportance* importance, uint64_t first, uint64_t last, Progress& progress) {
+  std::vector<LightPaths> parts((last - first + kPathsPerChunk - 1) / kPathsPerChunk);
   parallel_chunks(last - first, kPathsPerChunk, [&](size_t begin, size_t end) {
     if (progress.cancelled()) return;
-    std::vector<PathVpl>& part = parts[begin / kPathsPerChunk];
+    LightPaths& part = parts[begin / kPathsPerChunk];
     part = trace_paths(scene, emitters, options, importance, first + begin, first + end);
-    progress.advance(part.size());
+    progress.advance(part.lights.size());
   });
   progress.check();
-  std::vector<PathVpl> all;
-  for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
+  LightPaths all;
+  for (const LightPaths& part : parts) {
+    all.lights.insert(all.lights.end(), part.lights.begin(), part.lights.end());
+    all.glints.insert(all.glints.end(), part.glints.begin(), part.glints.end());
+  }
   return all;
 }
 

@@ -17,10 +17,14 @@ struct PathVpl {
   Vpl vpl;
 };
 
-// Lights of paths [first, last), in the order of paths, not divided by their number. `importance`: chooses where paths
+struct LightPaths {
+  std::vector<PathVpl> lights;
+  std::vector<Glint> glints;  // all of them, whatever importance keeps
+};
+
+// Of paths [first, last), in their order, not divided by their number. `importance`: chooses where paths
 // start and which lights are kept; null: by power alone, and all. Deterministic. Throws Error(cancelled).
-std::vector<PathVpl> trace_light_paths(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
-                                       const CameraImportance* importance, uint64_t first, uint64_t last,
-                                       Progress& progress);
+LightPaths trace_light_paths(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
+                             const CameraImportance* importance, uint64_t first, uint64_t last, Progress& progress);
 
 }  // namespace lumicut

@@ -22,7 +22,7 @@ uint64_t paths_for(const Scene& scene, const LightSampler& emitters, const VplOp
                            ? importance->lights_of_path() * static_cast<double>(trials)
                            : static_cast<double>(trace_light_paths(scene, emitters, options, nullptr, kFirstTrial,
                                                                    kFirstTrial + trials, progress)
-                                                     .size());
+                                                     .lights.size());
   if (!(found > 0.0)) return most;
   const double paths = static_cast<double>(wanted * trials) / found;
   return std::clamp<uint64_t>(static_cast<uint64_t>(std::llround(std::min(paths, static_cast<double>(most)))), 1, most);
@@ -32,7 +32,9 @@ void trace_indirect(const Scene& scene, const LightSampler& emitters, const VplO
                     const CameraImportance* importance, uint64_t wanted, Progress& progress, VplSet& set) {
   const uint64_t paths = paths_for(scene, emitters, options, importance, wanted, progress);
   const float normalise = 1.0f / static_cast<float>(paths);
-  for (const PathVpl& v : trace_light_paths(scene, emitters, options, importance, 0, paths, progress)) {
+  LightPaths traced = trace_light_paths(scene, emitters, options, importance, 0, paths, progress);
+  set.glints = std::move(traced.glints);
+  for (const PathVpl& v : traced.lights) {
     set.lights.push_back(v.vpl);
     set.lights.back().intensity *= normalise;
   }
@@ -125,6 +127,7 @@ VplSet trace_vpls(const Scene& scene, const LightSampler& emitters, const VplOpt
 
 VplSet off_surfaces(const VplSet& set, const Scene& scene) {
   VplSet moved = set;
+  moved.glints.clear();
   const size_t direct = set.light_paths > 0 ? set.direct : set.lights.size();
   const uint32_t scattered = scene.scattered_ray_mask();
   parallel_chunks(moved.lights.size(), 4096, [&](size_t begin, size_t end) {

@@ -52,6 +52,13 @@ struct Vpl {
   Vec3f tangent() const { return {blend_cosine, spot_cosine, spread_tan}; }
 };
 
+// Where a light path met what reflects evenly, after gloss, a mirror or glass threw it there, and from where.
+struct Glint {
+  Vec3f position, from;
+  float power;  // W, luminance
+  LUMICUT_FIELDS(Glint, position, from, power)
+};
+
 struct VplSet {
   std::vector<Vpl> lights;
   uint64_t light_paths = 0;               // that were started; 0 where nothing is known of the lights
@@ -59,7 +66,8 @@ struct VplSet {
   uint64_t first_of_sky = 0, of_sky = 0;  // those of them that stand for the environment
   uint64_t extended = 0;                  // samples drawn on emitters with extent for those; some give no light
   LightProfiles profiles;                 // those that lights name
-  LUMICUT_FIELDS(VplSet, lights, light_paths, direct, first_of_sky, of_sky, extended, profiles)
+  std::vector<Glint> glints;              // of light paths, not divided by their number
+  LUMICUT_FIELDS(VplSet, lights, light_paths, direct, first_of_sky, of_sky, extended, profiles, glints)
 };
 
 }  // namespace lumicut

@@ -21,8 +21,9 @@ struct ClampCompensation::Search {
     float travelled = 0.0f;  // from there to the ray's origin
     Rgb absorption{};        // on the ray's way, for each unit of length
     uint32_t passages = 0;
-    Rgb gloss{};         // the part of `weight` that virtual lights of bounced light and of the sky leave to it
-    float share = 1.0f;  // of what it brings, that counts: its point has several
+    Rgb gloss{};          // the part of `weight` that virtual lights of bounced light and of the sky leave to it
+    float share = 1.0f;   // of what it brings, that counts: its point has several
+    float spared = 1.0f;  // by so much more chance keeps what it finds than by `weight`
   };
   std::vector<RayHit> rays;
   std::vector<Carried> carried;
@@ -33,13 +34,15 @@ struct ClampCompensation::Search {
 };
 
 ClampCompensation::ClampCompensation(const Scene& scene, const Clamp& clamp, const NearbyLights* nearby, bool spheres,
-                                     bool trace_gloss, const EvenSky* sky, bool direct, uint64_t seed)
+                                     bool trace_gloss, const EvenSky* sky, const GlintGuide* glints, bool direct,
+                                     uint64_t seed)
     : scene_(scene),
       clamp_(clamp),
       nearby_(nearby),
       spheres_(spheres),
       trace_gloss_(trace_gloss),
       sky_(sky),
+      glints_(glints),
       direct_(direct),
       seed_(seed),
       light_surfaces_(scene, LightSurfaces::RaysOf::paths) {}
@@ -92,7 +95,7 @@ void ClampCompensation::find_surface(Search& search, size_t ray, TracedPoints& h
       RayHit& on = search.next_rays.emplace_back();
       on.ray.org = next->origin, on.ray.dir = next->direction, on.ray.mask = next->state.kind;
       search.next_carried.push_back({next->throughput, c.pixel, next->rng, c.pdf, c.from, distance,
-                                     next->state.absorption, c.passages + 1, c.gloss, c.share});
+                                     next->state.absorption, c.passages + 1, c.gloss, c.share, c.spared});
     }
   }
   if (direct_ || at.bsdf.layers().empty()) return;
@@ -103,8 +106,9 @@ void ClampCompensation::find_surface(Search& search, size_t ray, TracedPoints& h
     const Rgb evenly = point.diffuse;
     point.diffuse = point.diffuse * lost;
     if (trace_gloss_) point.diffuse += (evenly - point.diffuse) * c.gloss;
-    // Chance decides by what the surface still shows, so that few points cost a whole sum of lights.
-    const float survive = std::min(1.0f, max_component(PointBsdf(point).albedo() * weight));
+    // Chance decides by what the surface still shows, so that few points cost a whole sum of lights; not by what a
+    // direction lost that was favoured: many were sent there to find it.
+    const float survive = std::min(1.0f, max_component(PointBsdf(point).albedo() * weight) * c.spared);
     if (!(rng.next_float() < survive)) continue;
     point.attenuate(weight / survive * c.share);
     hits.add(point);
@@ -118,26 +122,41 @@ void ClampCompensation::trace(const ShadePoints& points, uint32_t level, std::sp
     if (i % 4096 == 0) progress.check();
     const SurfacePoint point = points.get(i);
     const uint32_t rays = rays_of_pixel.empty() ? 1u : rays_of_pixel[point.pixel];
+    GlintGuide::Directions glints;
+    if (glints_ != nullptr && rays > 1) glints = glints_->at(point.position, point.normal, search.scratch);
+    // The second, fourth, ... of its rays.
+    const float guided = glints.empty() ? 0.0f : static_cast<float>(rays / 2) / static_cast<float>(rays);
+    const PointBsdf bsdf(point);
+    // A point that rays found reflects less for each to have been one of many; the chance of what it finds in turn falls
+    // with the root of that alone, or the others would bring nothing where light comes by way of two surfaces.
+    const float spared = level > 1 ? std::sqrt(std::max(1.0f, 1.0f / max_component(bsdf.albedo()))) : 1.0f;
     Rng rng = rng_at_point(scene_, point, hash64(seed_, level), Stage::compensation);
     const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float();
     const uint64_t seed = rays > 1 ? Rng(rng).next_u32() : 0;
     for (uint32_t k = 0; k < rays; ++k) {
       const Vec3f at = even_in_cube(k, {choice, u, v});
-      const auto s = PointBsdf(point).sample(at.x, at.y, at.z);
-      if (!s || !is_finite(s->weight)) continue;
+      Rng own = k == 0 ? rng : Rng(hash64(seed, k), Stage::compensation);
+      auto s = guided > 0.0f && k % 2 == 1 ? bsdf.towards(glints.sample(at.x, at.y, at.z), own.next_float())
+                                           : bsdf.sample(at.x, at.y, at.z);
+      if (!s) continue;
+      // As drawn from both. [Veach, Guibas 1995: balance heuristic]
+      const float favour = guided > 0.0f ? std::lerp(s->pdf, glints.pdf(s->direction), guided) / s->pdf : 1.0f;
+      s->weight *= 1.0f / favour;
+      if (!is_finite(s->weight)) continue;
       RayHit ray;
       ray.ray.org = point.position, ray.ray.dir = s->direction, ray.ray.mask = ray_kind(s->flags);
       search.rays.push_back(ray);
       search.carried.push_back({s->weight,
                                 point.pixel,
-                                k == 0 ? rng : Rng(hash64(seed, k), Stage::compensation),
+                                own,
                                 s->pdf,
                                 point.position,
                                 0.0f,
                                 {},
                                 0,
                                 trace_gloss_ ? traced_part(point, s->direction) : Rgb{},
-                                1.0f / static_cast<float>(rays)});
+                                1.0f / static_cast<float>(rays),
+                                std::max(1.0f, favour) * spared});
     }
   }
   while (!search.rays.empty()) {

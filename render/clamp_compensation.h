@@ -8,6 +8,7 @@
 #include "core/stats.h"
 #include "lights/light_surfaces.h"
 #include "render/clamp.h"
+#include "render/glint_guide.h"
 #include "render/nearby_lights.h"
 #include "render/specular_chain.h"
 #include "render/traced_gloss.h"
@@ -19,9 +20,10 @@ class ClampCompensation {
  public:
   // `nearby`: samples what the clamp takes from emitters with extent; null: rays alone bring it. `spheres`: virtual lights
   // on surfaces are, and lose nothing by it. `trace_gloss`: rays bring a part of the gloss of bounced light, and of what
-  // `sky` has of the environment; null: nothing. `direct`: of what rays find, what shines alone. All outlive this.
+  // `sky` has of the environment; null: nothing. `glints`: where half of a point's rays go, if it has several; null: by its
+  // lobes all. `direct`: of what rays find, what shines alone. All outlive this.
   ClampCompensation(const Scene& scene, const Clamp& clamp, const NearbyLights* nearby, bool spheres, bool trace_gloss,
-                    const EvenSky* sky, bool direct, uint64_t seed);
+                    const EvenSky* sky, const GlintGuide* glints, bool direct, uint64_t seed);
 
   // Rays from each point (unless they are cut short by chance, or the point is black): as many as `rays` has for its pixel,
   // or one where it is empty. `level` counts the surfaces since the camera. Appends to `hits`. Deterministic: numbers belong to the places of points. Throws Error(cancelled).
@@ -41,6 +43,7 @@ class ClampCompensation {
   const NearbyLights* const nearby_;
   const bool spheres_, trace_gloss_;
   const EvenSky* const sky_;
+  const GlintGuide* const glints_;
   const bool direct_;
   const uint64_t seed_;
   LightSurfaces light_surfaces_;

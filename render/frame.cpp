@@ -483,7 +483,7 @@ void render_frame(const Scene& scene, std::span<const GroupMethod> methods, cons
   std::optional<ClampCompensation> compensation;
   if (light.compensated != nullptr)
     compensation.emplace(scene, *light.compensated, light.nearby, light.spheres, light.trace_gloss, light.sky,
-                         options.direct, options.seed);
+                         light.glints, options.direct, options.seed);
   context.progress.begin("render", size_t{options.crop.width()} * options.crop.height());
   tbb::parallel_for(
       tbb::blocked_range<size_t>(0, batches.size(), 1),

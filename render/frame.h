@@ -9,6 +9,7 @@
 #include "film/pixel_filter.h"
 #include "integrators/integrator.h"
 #include "render/clamp.h"
+#include "render/glint_guide.h"
 #include "render/nearby_lights.h"
 #include "render/traced_gloss.h"
 
@@ -53,6 +54,7 @@ struct FrameLight {
   const NearbyLights* nearby = nullptr;  // null: the clamp keeps what it takes from emitters
   const Clamp* compensated = nullptr;    // its loss is brought back by rays; null: it is not
   std::span<const uint8_t> rays = {};    // of those, from each point of a pixel of the crop; none: one
+  const GlintGuide* glints = nullptr;    // where half of them go; null: by the points' lobes all
   bool spheres = false;                  // virtual lights are, and lose nothing by it
   bool trace_gloss = false;              // rays bring a part of the gloss of bounced light [traced_gloss.h]
   const EvenSky* sky = nullptr;          // and of this of the environment

@@ -41,6 +41,7 @@ FrameLight RenderLoop::frame_light(const Prepared& prepared) const {
   light.trace_gloss = light.compensated != nullptr && prepared.params->common().trace_gloss &&
                       prepared.vpls->light_paths > 0 && may_trace_gloss(scene_);
   if (light.trace_gloss && sky_ && prepared.vpls->of_sky > 0) light.sky = &*sky_;
+  light.glints = prepared.glints.get();
   light.spheres = sphere_scale(prepared.params->common()) > 0.0f;
   return light;
 }

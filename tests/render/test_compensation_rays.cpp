@@ -54,17 +54,21 @@ TEST(CompensationRays, LookAtCancel) {
   EXPECT_THROW(compensation_rays(IterationMean(kCrop, 0.95, false), Film(kCrop), 2, progress), Error);
 }
 
-// A lamp by way of the metal around it: what rays find by chance.
-std::unique_ptr<Scene> make_lamp_in_metal() {
+// A lamp by way of the metal around it, or of a plate above it: what rays find by chance.
+std::unique_ptr<Scene> make_lamp_in_metal(bool plate = false) {
   auto scene = std::make_unique<Scene>(Scene::Config{"bvh", true});
   Material metal = test::diffuse(0.9f, 0.6f, 0.4f);
   metal.lobe = LobeModel::ggx, metal.specular = {1, 1, 1}, metal.metallic = 1, metal.roughness = 0.35f;
   scene->set_materials({test::diffuse(0.6f, 0.6f, 0.6f), metal});
   Mesh room;
   test::add_box(room, {-1, -1, -1}, {1, 1, 1}, 0, true);
-  test::add_box(room, {-0.15f, -0.15f, -0.1f}, {0.15f, 0.15f, 0.3f}, 1, true);
-  room.indices.erase(room.indices.begin() + 36, room.indices.begin() + 42);  // open below
-  room.triangle_materials.erase(room.triangle_materials.begin() + 12, room.triangle_materials.begin() + 14);
+  if (plate) {
+    test::add_quad(room, {-0.15f, -0.15f, 0.3f}, {-0.15f, 0.15f, 0.3f}, {0.15f, 0.15f, 0.3f}, {0.15f, -0.15f, 0.3f}, 1);
+  } else {
+    test::add_box(room, {-0.15f, -0.15f, -0.1f}, {0.15f, 0.15f, 0.3f}, 1, true);
+    room.indices.erase(room.indices.begin() + 36, room.indices.begin() + 42);  // open below
+    room.triangle_materials.erase(room.triangle_materials.begin() + 12, room.triangle_materials.begin() + 14);
+  }
   scene->add_mesh(std::move(room));
   Light lamp;
   lamp.type = LightType::point, lamp.position = {0, 0, 0.1f}, lamp.radius = 0.03f, lamp.value = {1, 1, 1};
@@ -74,7 +78,7 @@ std::unique_ptr<Scene> make_lamp_in_metal() {
 }
 
 // Images of seeds by render_frame itself: mean and mean variance of a pixel.
-std::pair<double, double> mean_and_variance(const Scene& scene, uint32_t rays, uint64_t seeds) {
+std::pair<double, double> mean_and_variance(const Scene& scene, uint32_t rays, uint64_t seeds, bool guided = false) {
   const test::RenderOptions size{.width = 16, .height = 12};
   std::vector<double> sum(size_t{size.width} * size.height), squares(sum.size());
   for (uint64_t seed = 1; seed <= seeds; ++seed) {
@@ -97,6 +101,7 @@ std::pair<double, double> mean_and_variance(const Scene& scene, uint32_t rays, u
       light.nearby = prepared.nearby.get(), light.compensated = prepared.clamp.get();
       const std::vector<uint8_t> each(sum.size(), static_cast<uint8_t>(rays));
       if (rays > 0) light.rays = each;
+      if (guided) light.glints = prepared.glints.get();
       const GroupMethod method{0, prepared.method.get()};
       render_frame(scene, {&method, 1}, frame, light, film, {progress, stats}, [](const Rect&) {});
     });
@@ -130,6 +135,20 @@ TEST(CompensationRays, MoreOfThemChangeNoMeanAndLessenItsNoise) {
   }
   EXPECT_GT(same, 0);
   EXPECT_GT(same_variance, 0);
+}
+
+TEST(CompensationRays, ThatGlintsGuideChangeNoMeanAndHaveFarLessNoise) {
+  const auto scene = make_lamp_in_metal(true);
+  const uint64_t seeds = test::kSanitized ? 4 : 60;
+  const auto [mean, variance] = mean_and_variance(*scene, 8, seeds);
+  const auto [guided, less] = mean_and_variance(*scene, 8, seeds, true);
+  const double deviation = std::sqrt(variance / (192.0 * static_cast<double>(seeds))) / mean;
+  RecordProperty("ratio", std::to_string(guided / mean) + " +- " + std::to_string(deviation));
+  RecordProperty("variance", std::to_string(less / variance));
+  EXPECT_NEAR(guided / mean, 1.0, test::kSanitized ? 0.2 : 3 * deviation + 0.01);
+  if (!test::kSanitized) {
+    EXPECT_LT(less, 0.1 * variance) << "measured: a hundredth";
+  }
 }
 
 }  // namespace
