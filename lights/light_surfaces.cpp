@@ -8,14 +8,14 @@
 
 namespace lumicut {
 
-LightSurfaces::LightSurfaces(const Scene& scene, RaysOf rays) : scene_(scene) {
+LightSurfaces::LightSurfaces(const Scene& scene, RaysOf rays) : scene_(scene), of_paths_(rays == RaysOf::paths) {
   bool disks = false;
   for (uint32_t i = 0; i < scene.lights().size(); ++i) {
     const Light& l = scene.lights()[i];
     const bool seen = l.reach.lights(kCameraRay);
     if (rays == RaysOf::camera && !seen) continue;
     if (l.radius > 0.0f && max_component(l.value) > 0.0f) {
-      const bool shown = rays == RaysOf::mirrors && l.reach.lights(kGlossyRay | kTransmissionRay);
+      const bool shown = rays != RaysOf::camera && l.reach.lights(kGlossyRay | kTransmissionRay);
       if ((seen || shown) && (l.type == LightType::point || l.type == LightType::spot) && l.profile == 0)
         lamps_.push_back(i);
       if (shown && l.type == LightType::sun) suns_.push_back(i);
@@ -84,7 +84,7 @@ bool LightSurfaces::meet_lamp(uint32_t lamp, const Vec3f& origin, const Vec3f& d
   const Vpl emits = soft_lamp(l, {});
   const float falloff = l.type == LightType::spot ? spot_falloff(emits, -dot(l.direction, direction)) : 1.0f;
   hit.light = lamp, hit.cosine = 1.0f, hit.by_rays = false;
-  hit.radiance = l.value * (falloff * std::numbers::inv_pi_v<float> / r2);
+  hit.radiance = l.value * (falloff * share_of(r2 / d2) * std::numbers::inv_pi_v<float> / r2);
   return true;
 }
 
@@ -94,7 +94,7 @@ bool LightSurfaces::meet_sun(uint32_t sun, const Vec3f& direction, Hit& hit) con
   if (!(dot(direction, -l.direction) > std::cos(l.radius))) return false;
   const float half = std::sin(0.5f * l.radius);
   hit.light = sun, hit.t = std::numeric_limits<float>::infinity(), hit.cosine = 1.0f, hit.by_rays = false;
-  hit.radiance = l.value / (4.0f * std::numbers::pi_v<float> * half * half);
+  hit.radiance = l.value * (share_of(4.0f * half * half) / (4.0f * std::numbers::pi_v<float> * half * half));
   return true;
 }
 

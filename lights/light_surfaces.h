@@ -3,6 +3,7 @@
 // camera sees.
 #pragma once
 
+#include <algorithm>
 #include <limits>
 #include <memory>
 
@@ -13,7 +14,9 @@ namespace lumicut {
 class LightSurfaces final : private HitFilter {
  public:
   // Whose rays meet them. Of the camera: what it sees alone. By way of mirrors and glass from the camera: lamps and suns
-  // with a radius too, which nothing else would show there. Paths: lights that samples cannot stand for alone.
+  // with a radius too, which nothing else would show there. Paths, which left a surface that lights are sampled at:
+  // lights that samples cannot stand for alone, and those lamps and suns too, for what comes by way of mirrors and glass;
+  // of them seen under less than a degree to either side a part (kLeastSine).
   enum class RaysOf { camera, mirrors, paths };
   LightSurfaces(const Scene& scene, RaysOf rays);
   bool empty() const { return lights_.empty() && lamps_.empty() && suns_.empty(); }
@@ -41,12 +44,19 @@ class LightSurfaces final : private HitFilter {
   static float area(const Light& light);
   static bool has(const Light& light) { return light.type == LightType::rectangle || light.type == LightType::disk; }
   static constexpr int kMostLights = 64;  // along one ray
+  // Paths that left a surface meet a small lamp in a mirror seldom, as a dot: none is brighter than that of a lamp under
+  // this sine to either side, of one degree. What is above it is lost.
+  static constexpr float kLeastSine = 0.0174524f;
   bool next(const Vec3f& origin, const Vec3f& direction, float& near, float far, Hit& hit) const;
   bool meet_lamp(uint32_t lamp, const Vec3f& origin, const Vec3f& direction, float far, Hit& hit) const;
   bool meet_sun(uint32_t sun, const Vec3f& direction, Hit& hit) const;
   bool passes(const CandidateHit& hit) const override;
 
+  // Of a lamp or sun that is seen under that sine, squared.
+  float share_of(float sine2) const { return of_paths_ ? std::min(1.0f, sine2 / (kLeastSine * kLeastSine)) : 1.0f; }
+
   const Scene& scene_;
+  const bool of_paths_;
   std::vector<uint32_t> lights_;
   std::vector<uint32_t> lamps_, suns_;  // with a radius
   std::vector<Vec3f> positions_;
