@@ -42,6 +42,8 @@ Bsdf::Bsdf(const BsdfParameters& parameters, const SurfaceView& view)
   if (parameters.model != LobeModel::ggx) {
     p.mirror = normalize(reflect(to_viewer_, p.normal));
     p.diffuse = parameters.diffuse * kInvPi;
+    if (parameters.slope > 0.0f)
+      set_oren_nayar(parameters.diffuse, parameters.slope, parameters.facets_once, set_mirror(to_viewer_, p), p);
     p.specular = parameters.specular * cosine_lobe_scale(parameters.model == LobeModel::phong, parameters.exponent);
     p.shape = parameters.exponent;
     diffuse_color_ = parameters.diffuse, specular_color_ = parameters.specular;
@@ -128,8 +130,9 @@ std::optional<BsdfSample> Bsdf::sample(float layer, float choice, float u, float
 Rgb Bsdf::passed_intensity(const Rgb& flux) const { return flux * parameters_.translucency * kInvPi; }
 
 Rgb Bsdf::lambertian_intensity(const Rgb& flux) const {
-  if (parameters_.model != LobeModel::ggx) return flux * parameters_.diffuse * kInvPi;
   const SurfacePoint& p = layers_[0];
+  if (p.grooved()) return flux * p.diffuse * mean_oren_nayar_factor(p.slope, p.again, dot(p.normal, p.mirror));
+  if (parameters_.model != LobeModel::ggx) return flux * parameters_.diffuse * kInvPi;
   const float even = mean_diffuse_falloff(p.falloff);
   return flux * p.diffuse * (p.burley() ? even * mean_burley_factor(p.retro, p.dim, dot(p.normal, p.mirror)) : even);
 }
@@ -236,7 +239,7 @@ static Vec3f turned(const Vec3f& direction, const Vec3f& from, const Vec3f& to) 
 }
 
 std::optional<ScatterSample> Bsdf::scatter(Rng& rng) const {
-  if (parameters_.model != LobeModel::ggx && !translucent()) return scatter_cosine(rng);
+  if (parameters_.model != LobeModel::ggx && !translucent() && !layers_[0].grooved()) return scatter_cosine(rng);
   const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float(), lobe = rng.next_float();
   const auto specular = sample_specular(lobe, u, v, Passage::straight);
   const float q_specular = specular ? std::min(1.0f, max_component(specular->weight)) : 0.0f;

@@ -13,9 +13,11 @@ enum class LobeModel { blinn, phong, ggx };
 struct BsdfParameters {
   LobeModel model = LobeModel::blinn;
   Rgb diffuse{},
-      specular{};         // kd and ks; GGX: base colour, and factor of the dielectric's F0 (or F0 without `fresnel`)
-  Rgb translucency{};     // what is passed on evenly to the other side
-  float exponent = 0.0f;  // Blinn, Phong
+      specular{};            // kd and ks; GGX: base colour, and factor of the dielectric's F0 (or F0 without `fresnel`)
+  Rgb translucency{};        // what is passed on evenly to the other side
+  float slope = 0.0f;        // Oren and Nayar's diffuse, of Blinn and Phong (bsdf/oren_nayar.h); 0: Lambert's
+  bool facets_once = false;  // what its facets reflect more than once is lost
+  float exponent = 0.0f;     // Blinn, Phong
   // GGX alone.
   bool fresnel = true;
   Rgb specular_tint{1, 1, 1};  // of metal at 82 degrees, and of what glass reflects

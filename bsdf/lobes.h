@@ -83,6 +83,7 @@ auto with_lobe(const SurfacePoint& p, const Fn& fn) {
 #include "bsdf/burley.h"
 #include "bsdf/lambert.h"
 #include "bsdf/lanes-inl.h"
+#include "bsdf/oren_nayar.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
@@ -114,15 +115,24 @@ struct DiffuseShape {
   bool burley;  // of some lane
   bool bent;    // of any point; else `smooth` is 0
   V3 smooth;
+  bool grooved;  // any point; else both are 0
+  V slope, again;
 };
 template <class Points>
 HWY_INLINE DiffuseShape LoadDiffuse(D d, const Points& points, size_t p) {
   const V retro = Load1(d, points.retro, p), dim = Load1(d, points.dim, p);
   const V zero = hn::Zero(d);
-  DiffuseShape shape{
-      Load1(d, points.falloff, p), retro, dim, !hn::AllFalse(d, hn::Gt(hn::Add(retro, dim), zero)), points.bent(),
-      {zero, zero, zero}};
+  DiffuseShape shape{Load1(d, points.falloff, p),
+                     retro,
+                     dim,
+                     !hn::AllFalse(d, hn::Gt(hn::Add(retro, dim), zero)),
+                     points.bent(),
+                     {zero, zero, zero},
+                     points.grooved(),
+                     zero,
+                     zero};
   if (shape.bent) shape.smooth = Load3(d, points.smooth, p);
+  if (shape.grooved) shape.slope = Load1(d, points.slope, p), shape.again = Load1(d, points.again, p);
   return shape;
 }
 // n·m, n·l, m·l; and where any point is bent s·n and s·l.
@@ -133,12 +143,18 @@ struct DiffuseCosines {
 HWY_INLINE V DiffuseFactor(D d, const DiffuseShape& s, const DiffuseCosines& c) {
   V factor = DiffuseFalloff(d, s.falloff, c.light);
   if (s.burley) factor = hn::Mul(factor, BurleyFactor(d, s.retro, s.dim, c.view, c.light, c.beta));
+  if (s.grooved) factor = hn::Mul(factor, OrenNayarFactor(d, s.slope, s.again, c.view, c.light, c.beta));
   return s.bent ? hn::Mul(factor, BumpShadow(d, c.light, c.smooth_normal, c.smooth_light)) : factor;
 }
 // Bound of it over lights of at most `cosine` and views of at least `view`, where the rest of a product is bounded with the
-// light's cosine over `steep`. `rise`: the largest k of bsdf/burley.h, at least 0.
-HWY_INLINE V BoundOfDiffuse(D d, V falloff, V rise, V view, V cosine, V steep) {
-  const V even = BoundOfDiffuseFalloff(d, falloff, cosine);
+// light's cosine over `steep`. `rise`: the largest k of bsdf/burley.h, at least 0; slope, again: largest.
+HWY_INLINE V BoundOfDiffuse(D d, V falloff, V rise, V slope, V again, V view, V cosine, V steep) {
+  V even = BoundOfDiffuseFalloff(d, falloff, cosine);
+  const auto grooved = hn::Gt(slope, hn::Zero(d));
+  if (!hn::AllFalse(d, grooved)) {
+    const V facets = BoundOfOrenNayarFactor(d, slope, again, view, cosine, steep);
+    even = hn::IfThenElse(grooved, hn::Mul(even, hn::Max(hn::Set(d, 1.0f), facets)), even);
+  }
   const auto rises = hn::Gt(rise, hn::Zero(d));
   if (hn::AllFalse(d, rises)) return even;
   const V retro = BoundOfBurleyFactor(d, rise, view, cosine, steep);
@@ -173,7 +189,7 @@ HWY_INLINE LobeShape LoadShape(D d, const Points& points, size_t p) {
   else {
     const V zero = hn::Zero(d);
     return {{kLobes == Lobes::cosine ? Load1(d, points.shape, p) : hn::Zero(d), hn::Zero(d)},
-            {zero, zero, zero, false, false, {zero, zero, zero}},
+            {zero, zero, zero, false, false, {zero, zero, zero}, false, zero, zero},
             hn::Zero(du),
             {}};
   }

@@ -8,6 +8,7 @@
 #include "bsdf/burley.h"
 #include "bsdf/lambert.h"
 #include "bsdf/lobes.h"
+#include "bsdf/oren_nayar.h"
 
 namespace lumicut {
 
@@ -22,6 +23,7 @@ inline Rgb reflectance(const SurfacePoint& p, const Vec3f& to_light) {
   float even = diffuse_falloff(p.falloff, cosine);
   if (p.bent() && cosine > 0.0f) even *= bump_shadow(p, cosine, to_light);
   if (p.burley()) even *= burley_factor(p, cosine, dot(p.mirror, to_light));
+  if (p.grooved()) even *= oren_nayar_factor(p, cosine, dot(p.mirror, to_light));
   Rgb f = p.diffuse * even;
   f += with_lobe(p, [&](auto lobe) { return lobe.value(p, to_light); });
   return f;

@@ -27,17 +27,19 @@ struct SurfacePoint {
   Rgb grazing{};       // GGX: F90, at grazing incidence
   float shape = 0.0f;  // of the glossy lobe; cosine lobe: the exponent n; GGX: α = roughness², above 0
   float ior = 1.5f;    // GGX: of the dielectric whose Fresnel curve leads from specular to grazing
-  uint32_t lobe = kCosineLobe;     // which one: its place in the list of bsdf/lobes.h
-  float falloff = 0.0f;            // of the diffuse part towards grazing light (bsdf/lambert.h)
-  float retro = 0.0f, dim = 0.0f;  // of the diffuse part, as Burley's is (bsdf/burley.h)
-  uint32_t pixel = 0;              // points of one pixel lie together
+  uint32_t lobe = kCosineLobe;       // which one: its place in the list of bsdf/lobes.h
+  float falloff = 0.0f;              // of the diffuse part towards grazing light (bsdf/lambert.h)
+  float retro = 0.0f, dim = 0.0f;    // of the diffuse part, as Burley's is (bsdf/burley.h)
+  float slope = 0.0f, again = 0.0f;  // of the diffuse part, as Oren and Nayar's is (bsdf/oren_nayar.h)
+  uint32_t pixel = 0;                // points of one pixel lie together
   Vec3f smooth{};           // unit: before textures bent the normal, where that dims (bsdf/bump_shadow.h); else 0
   uint32_t not_lit_by = 0;  // sets of receivers that its mesh is not in (scene/ray_kind.h)
 
   bool burley() const { return retro > 0.0f || dim > 0.0f; }
+  bool grooved() const { return slope > 0.0f; }
   bool bent() const { return smooth != Vec3f{}; }
   Lobes lobes() const {
-    if (lobe != kCosineLobe || falloff > 0.0f || burley() || bent()) return Lobes::all;
+    if (lobe != kCosineLobe || falloff > 0.0f || burley() || grooved() || bent()) return Lobes::all;
     return max_component(specular) > 0.0f ? Lobes::cosine : Lobes::none;
   }
   // All light that it reflects, times `factor`: what a path has lost on its way here.
@@ -47,13 +49,14 @@ struct SurfacePoint {
 struct ShadePoints {
   // position, normal, mirror, diffuse, specular, grazing, smooth: [component][point]
   std::vector<float> position[3], normal[3], mirror[3], diffuse[3], specular[3], grazing[3], smooth[3], shape, ior,
-      falloff, retro, dim;
+      falloff, retro, dim, slope, again;
   std::vector<uint32_t> lobe, pixel, not_lit_by;
 
   size_t size() const { return size_; }
   // Of any of the points: kernels skip what none has.
   Lobes lobes() const { return lobes_; }
   bool bent() const { return bent_; }
+  bool grooved() const { return grooved_; }
   void clear();
   void reserve(size_t n);
   void push(const SurfacePoint& p);
@@ -66,7 +69,7 @@ struct ShadePoints {
  private:
   size_t size_ = 0;
   Lobes lobes_ = Lobes::none;
-  bool bent_ = false;  // any of the points
+  bool bent_ = false, grooved_ = false;  // any of the points
 };
 
 }  // namespace lumicut

@@ -181,7 +181,7 @@ struct BoundsKernel {
           color = BoundOfColor(d, specular, Load3(d, block.grazing, i), bound.fresnel);
           const DiffuseShape& own = shape.diffuse;
           const V rise = hn::Max(zero, hn::Sub(own.retro, own.dim));
-          const V even = BoundOfDiffuse(d, own.falloff, rise, Dot(normal, mirror), cosine, steep);
+          const V even = BoundOfDiffuse(d, own.falloff, rise, own.slope, own.again, Dot(normal, mirror), cosine, steep);
           f = {hn::Mul(f.x, even), hn::Mul(f.y, even), hn::Mul(f.z, even)};
         }
         f = {hn::MulAdd(color.x, bound.lobe, f.x), hn::MulAdd(color.y, bound.lobe, f.y),

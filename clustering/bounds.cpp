@@ -25,7 +25,7 @@ void light_node_bounds(const LightNode& node, const PointBlock& block, float* bo
 
 void PointBlock::load(const ShadePoints& points, size_t first) {
   lobes = Lobes::none;
-  any_bent = points.bent();
+  any_bent = points.bent(), any_grooved = points.grooved();
   for (size_t i = 0; i < kLanes; ++i) {
     const SurfacePoint p = points.get(first + i);
     const Frame n(p.normal), m(p.mirror);
@@ -39,6 +39,7 @@ void PointBlock::load(const ShadePoints& points, size_t first) {
       for (int k = 0; k < 3; ++k) smooth[k][i] = p.smooth[k];
     shape[i] = p.shape, ior[i] = p.ior, lobe[i] = p.lobe;
     falloff[i] = p.falloff, retro[i] = p.retro, dim[i] = p.dim;
+    slope[i] = p.slope, again[i] = p.again;
     lobes = std::max(lobes, p.lobes());
   }
 }

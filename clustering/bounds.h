@@ -14,11 +14,13 @@ struct alignas(64) PointBlock {
   float mirror[3][kLanes], mirror_tangent[3][kLanes], mirror_bitangent[3][kLanes];
   float diffuse[3][kLanes], specular[3][kLanes], grazing[3][kLanes];
   float shape[kLanes], ior[kLanes], falloff[kLanes], retro[kLanes], dim[kLanes];
-  float smooth[3][kLanes];  // where any point is bent
+  float slope[kLanes], again[kLanes];  // where any point is grooved
+  float smooth[3][kLanes];             // where any point is bent
   uint32_t lobe[kLanes];
   Lobes lobes = Lobes::none;  // of any of the points
-  bool any_bent = false;
+  bool any_bent = false, any_grooved = false;
   bool bent() const { return any_bent; }
+  bool grooved() const { return any_grooved; }
 
   // Points [first, first + kLanes) of `points`, first a multiple of kLanes.
   void load(const ShadePoints& points, size_t first);

@@ -123,6 +123,7 @@ struct PairKernel {
         } else {
           const V3 gloss = LargestGloss(LaneLobes{}, d, nodes, i, cosine, beta, steep);
           const V even = BoundOfDiffuse(d, hn::Load(d, nodes.falloff + i), hn::Load(d, nodes.burley_rise + i),
+                                        hn::Load(d, nodes.slope + i), hn::Load(d, nodes.again + i),
                                         hn::Load(d, nodes.view_cosine + i), cosine, steep);
           f = {hn::MulAdd(f.x, even, gloss.x), hn::MulAdd(f.y, even, gloss.y), hn::MulAdd(f.z, even, gloss.z)};
         }
@@ -173,7 +174,7 @@ void PointNodes::set(size_t lane, const ShadePoints& points, size_t first, size_
   } sums[kLobeCount];
   Aabb box, normals, mirrors;
   Rgb kd{};
-  float least_falloff = kMost, rise = 0.0f, view = 1.0f;
+  float least_falloff = kMost, rise = 0.0f, view = 1.0f, steepest = 0.0f, most_again = 0.0f;
   bool burley = false;
   const auto at = [](const std::vector<float>(&a)[3], size_t i) { return Vec3f{a[0][i], a[1][i], a[2][i]}; };
   for (size_t i = first; i < first + count; ++i) {
@@ -183,6 +184,10 @@ void PointNodes::set(size_t lane, const ShadePoints& points, size_t first, size_
     least_falloff = std::min(least_falloff, points.falloff[i]);
     if (points.retro[i] > 0.0f || points.dim[i] > 0.0f) {
       burley = true, rise = std::max(rise, points.retro[i] - points.dim[i]);
+      view = std::min(view, dot(points.normal_at(i), at(points.mirror, i)));
+    }
+    if (points.slope[i] > 0.0f) {
+      steepest = std::max(steepest, points.slope[i]), most_again = std::max(most_again, points.again[i]);
       view = std::min(view, dot(points.normal_at(i), at(points.mirror, i)));
     }
     const Rgb specular = at(points.specular, i), grazing = at(points.grazing, i);
@@ -197,7 +202,7 @@ void PointNodes::set(size_t lane, const ShadePoints& points, size_t first, size_
     has_lobe |= 1u << points.lobe[i];
   }
   if (has_lobe != 0) lobes = std::max(lobes, has_lobe == 1u << kCosineLobe ? Lobes::cosine : Lobes::all);
-  if (least_falloff > 0.0f || burley) lobes = Lobes::all;
+  if (least_falloff > 0.0f || burley || steepest > 0.0f) lobes = Lobes::all;
   used |= 1u << lane;
   const auto put = [lane](float(&to)[3][kLanes], const Vec3f& v) {
     for (int k = 0; k < 3; ++k) to[k][lane] = v[k];
@@ -213,6 +218,7 @@ void PointNodes::set(size_t lane, const ShadePoints& points, size_t first, size_
   mirror_cos[lane] = shine.cos_half, mirror_sin[lane] = shine.sin_half();
   put(diffuse, kd);
   falloff[lane] = least_falloff, burley_rise[lane] = rise, view_cosine[lane] = view;
+  slope[lane] = steepest, again[lane] = most_again;
   for (uint32_t k = 0; k < kLobeCount; ++k) {
     const bool some = sums[k].low < kMost;
     put(of_lobe[k].specular, sums[k].specular), put(of_lobe[k].grazing, sums[k].grazing);
@@ -229,7 +235,8 @@ void PointNodes::pad(size_t lane) {
   const auto copy3 = [&copy](float(&a)[3][kLanes]) { copy(a[0]), copy(a[1]), copy(a[2]); };
   for (auto* a : {&center, &half, &normal, &tangent, &bitangent, &mirror, &mirror_tangent, &mirror_bitangent, &diffuse})
     copy3(*a);
-  for (auto* a : {&normal_cos, &normal_sin, &mirror_cos, &mirror_sin, &radius2, &falloff, &burley_rise, &view_cosine})
+  for (auto* a : {&normal_cos, &normal_sin, &mirror_cos, &mirror_sin, &radius2, &falloff, &burley_rise, &view_cosine,
+                  &slope, &again})
     copy(*a);
   for (OfLobe& own : of_lobe) {
     copy3(own.specular), copy3(own.grazing);

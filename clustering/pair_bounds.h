@@ -16,9 +16,10 @@ struct alignas(64) PointNodes {
       mirror_sin[kLanes];
   float diffuse[3][kLanes];  // largest of the points, channel by channel
   float falloff[kLanes];     // least of the points
-  // Largest k of bsdf/burley.h, at least 0, and least cosine to the viewer of the points that are Burley's.
+  // Largest k of bsdf/burley.h, at least 0, and least cosine to the viewer of the points that are Burley's or Oren and Nayar's.
   float burley_rise[kLanes], view_cosine[kLanes];
-  float radius2[kLanes];  // squared half diagonal of the box
+  float slope[kLanes], again[kLanes];  // largest of bsdf/oren_nayar.h
+  float radius2[kLanes];               // squared half diagonal of the box
   // What bounds read of the points that have one of the lobes of bsdf/lobes.h.
   struct OfLobe {
     float specular[3][kLanes], grazing[3][kLanes];  // largest, channel by channel

@@ -83,7 +83,8 @@ HWY_INLINE V MeanOfCosines(D d, const SphereCone& c, const V3& normal, const V3&
   const V na = Dot(normal, c.axis), la = kCosine ? Dot(facing, c.axis) : one;
   auto above = LiesAbove(d, c, na);
   if constexpr (kCosine) above = hn::And(above, LiesAbove(d, c, la));
-  if constexpr (kShaped) above = hn::And(above, hn::Eq(hn::Add(shape.falloff, hn::Add(shape.retro, shape.dim)), zero));
+  if constexpr (kShaped)
+    above = hn::And(above, hn::Eq(hn::Add(hn::Add(shape.falloff, shape.slope), hn::Add(shape.retro, shape.dim)), zero));
   if (!(kShaped && shape.bent) && hn::AllTrue(d, above)) {
     // Means of cos and cos² to the axis.
     const V first = hn::NegMulAdd(half, c.versine, one);
@@ -107,7 +108,8 @@ HWY_INLINE V MeanOfCosines(D d, const SphereCone& c, const V3& normal, const V3&
   const V nt = Dot(normal, t), nb = Dot(normal, b), lt = Dot(facing, t), lb = Dot(facing, b);
   V nm = zero, ma = zero, mt = zero, mb = zero, sn = zero, sa = zero, st = zero, sb = zero;
   if constexpr (kShaped) {
-    if (shape.burley) nm = Dot(normal, mirror), ma = Dot(mirror, c.axis), mt = Dot(mirror, t), mb = Dot(mirror, b);
+    if (shape.burley || shape.grooved)
+      nm = Dot(normal, mirror), ma = Dot(mirror, c.axis), mt = Dot(mirror, t), mb = Dot(mirror, b);
     if (shape.bent) {
       sn = Dot(shape.smooth, normal), sa = Dot(shape.smooth, c.axis);
       st = Dot(shape.smooth, t), sb = Dot(shape.smooth, b);
@@ -126,7 +128,7 @@ HWY_INLINE V MeanOfCosines(D d, const SphereCone& c, const V3& normal, const V3&
         both = hn::Mul(cx, hn::Max(zero, hn::MulAdd(cosine, la, hn::MulAdd(x, lt, hn::Mul(y, lb)))));
       if constexpr (kShaped) {
         DiffuseCosines cosines{nm, cx, zero, sn, zero};
-        if (shape.burley) cosines.beta = hn::MulAdd(cosine, ma, hn::MulAdd(x, mt, hn::Mul(y, mb)));
+        if (shape.burley || shape.grooved) cosines.beta = hn::MulAdd(cosine, ma, hn::MulAdd(x, mt, hn::Mul(y, mb)));
         if (shape.bent) cosines.smooth_light = hn::MulAdd(cosine, sa, hn::MulAdd(x, st, hn::Mul(y, sb)));
         both = hn::Mul(both, DiffuseFactor(d, shape, cosines));
       }

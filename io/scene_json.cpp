@@ -326,8 +326,14 @@ class SceneReader {
       if (!ggx) absorption->fail("is of the model \"ggx\" alone");
       store(m.absorption, absorption->vector3(0, 1e9) * (1.0 / scale_));
     }
+    if (auto oren_nayar = object.find("oren_nayar")) {
+      if (ggx) oren_nayar->fail("is not of the model \"ggx\"");
+      constexpr uint32_t kOnce = LUMICUT_OREN_NAYAR | LUMICUT_FACETS_ONCE, kFlags[] = {0, kOnce, LUMICUT_OREN_NAYAR};
+      m.flags = (m.flags & ~kOnce) | kFlags[oren_nayar->choice({"none", "once", "often"})];
+    }
+    if (ggx) m.flags &= ~uint32_t{LUMICUT_OREN_NAYAR | LUMICUT_FACETS_ONCE};
     number("shininess", m.shininess, 0, 1e6, !ggx);
-    number("roughness", m.roughness, 0, 1, ggx);
+    number("roughness", m.roughness, 0, 1, ggx || (m.flags & LUMICUT_OREN_NAYAR) != 0);
     number("metallic", m.metallic, 0, 1, ggx);
     number("transmission", m.transmission, 0, 1, ggx);
     if ((m.flags & LUMICUT_NO_FRESNEL) != 0)

@@ -295,6 +295,10 @@ class Writer {
     };
     flag(LUMICUT_NO_FRESNEL, "fresnel", false);
     flag(LUMICUT_BURLEY, "burley", true);
+    if ((m.flags & LUMICUT_OREN_NAYAR) != 0) {
+      out["oren_nayar"] = (m.flags & LUMICUT_FACETS_ONCE) != 0 ? "once" : "often";
+      out["roughness"] = m.roughness;
+    }
     flag(LUMICUT_SHADOWS_PASS, "shadows_pass", true);
     flag(LUMICUT_EMIT_BOTH_SIDES, "emit_both_sides", true);
     flag(LUMICUT_HOLDOUT, "holdout", true);

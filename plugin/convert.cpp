@@ -93,7 +93,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   const FieldValidator c("lumicut_material", index);
   c.flags("flags", in.flags,
           LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG | LUMICUT_GGX | LUMICUT_NO_FRESNEL | LUMICUT_BURLEY |
-              LUMICUT_SHADOWS_PASS | LUMICUT_HOLDOUT | LUMICUT_BUMP_SHADOWS);
+              LUMICUT_SHADOWS_PASS | LUMICUT_HOLDOUT | LUMICUT_BUMP_SHADOWS | LUMICUT_OREN_NAYAR | LUMICUT_FACETS_ONCE);
   if ((in.flags & LUMICUT_PHONG) != 0 && (in.flags & LUMICUT_GGX) != 0)
     c.fail("flags", "holds both LUMICUT_PHONG and LUMICUT_GGX");
   if ((in.flags & LUMICUT_NO_FRESNEL) != 0) {
@@ -105,6 +105,10 @@ Material to_material(const lumicut_material& in, uint64_t index) {
     if ((in.flags & LUMICUT_GGX) == 0) c.fail("flags", "holds LUMICUT_BURLEY without LUMICUT_GGX");
     if ((in.flags & LUMICUT_NO_FRESNEL) != 0) c.fail("flags", "holds both LUMICUT_BURLEY and LUMICUT_NO_FRESNEL");
   }
+  if ((in.flags & LUMICUT_OREN_NAYAR) != 0 && (in.flags & LUMICUT_GGX) != 0)
+    c.fail("flags", "holds both LUMICUT_OREN_NAYAR and LUMICUT_GGX");
+  if ((in.flags & LUMICUT_FACETS_ONCE) != 0 && (in.flags & LUMICUT_OREN_NAYAR) == 0)
+    c.fail("flags", "holds LUMICUT_FACETS_ONCE without LUMICUT_OREN_NAYAR");
   if ((in.flags & LUMICUT_SHADOWS_PASS) != 0) {
     if ((in.flags & LUMICUT_GGX) == 0) c.fail("flags", "holds LUMICUT_SHADOWS_PASS without LUMICUT_GGX");
     if (!(in.transmission > 0.0f)) c.fail("transmission", "must be above 0 with LUMICUT_SHADOWS_PASS");
@@ -132,6 +136,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   if ((in.flags & LUMICUT_GGX) != 0) m.lobe = LobeModel::ggx;
   m.fresnel = (in.flags & LUMICUT_NO_FRESNEL) == 0;
   m.burley = (in.flags & LUMICUT_BURLEY) != 0;
+  m.oren_nayar = (in.flags & LUMICUT_OREN_NAYAR) != 0, m.facets_once = (in.flags & LUMICUT_FACETS_ONCE) != 0;
   m.shadows_pass = (in.flags & LUMICUT_SHADOWS_PASS) != 0;
   m.holdout = (in.flags & LUMICUT_HOLDOUT) != 0;
   m.bump_shadows = (in.flags & LUMICUT_BUMP_SHADOWS) != 0;

@@ -17,6 +17,7 @@ struct Material {
   Rgb translucency{};  // share of the light that leaves on the other side, evenly
   float shininess = 0.0f;
   LobeModel lobe = LobeModel::blinn;
+  bool oren_nayar = false, facets_once = false;  // not of GGX: bsdf/oren_nayar.h, of the slope `roughness`
   // GGX alone: `diffuse` is the base colour, `specular` multiplies the dielectric's reflectance at normal incidence.
   // Without `fresnel` it is the lobe's own reflectance at every angle, beside Lambert's `diffuse`: no metal, no glass.
   bool fresnel = true;
@@ -38,11 +39,11 @@ struct Material {
   int32_t roughness_texture = -1, metallic_texture = -1;  // GGX alone; green and blue, as glTF packs them
   int32_t diffuse_texture = -1, specular_texture = -1, opacity_texture = -1, emission_texture = -1;
   int32_t translucency_texture = -1;
-  LUMICUT_FIELDS(Material, diffuse, specular, translucency, shininess, lobe, fresnel, burley, specular_tint, roughness,
-                 metallic, ior, transmission, coat, coat_roughness, coat_ior, shadows_pass, absorption, bump_shadows,
-                 holdout, opacity, emission, emit_both_sides, normal_strength, normal_texture, bump_strength,
-                 bump_distance, height_texture, roughness_texture, metallic_texture, diffuse_texture, specular_texture,
-                 opacity_texture, emission_texture, translucency_texture)
+  LUMICUT_FIELDS(Material, diffuse, specular, translucency, shininess, lobe, oren_nayar, facets_once, fresnel, burley,
+                 specular_tint, roughness, metallic, ior, transmission, coat, coat_roughness, coat_ior, shadows_pass,
+                 absorption, bump_shadows, holdout, opacity, emission, emit_both_sides, normal_strength, normal_texture,
+                 bump_strength, bump_distance, height_texture, roughness_texture, metallic_texture, diffuse_texture,
+                 specular_texture, opacity_texture, emission_texture, translucency_texture)
 
   // Whether light that goes straight through its glass is absorbed there.
   bool absorbs_straight() const { return shadows_pass && max_component(absorption) > 0.0f; }

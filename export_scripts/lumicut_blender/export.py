@@ -237,6 +237,9 @@ class Writer:
                     out[key] = self.texture(getattr(m, key), "vectors")
         else:
             out["shininess"] = numbers([m.shininess])[0]
+            if m.flags & library.OREN_NAYAR:
+                out["oren_nayar"] = "once" if m.flags & library.FACETS_ONCE else "often"
+                out["roughness"] = numbers([m.roughness])[0]
         if m.flags & library.BUMP_SHADOWS:
             out["bump_shadows"] = True
         if m.flags & library.HOLDOUT:

@@ -106,6 +106,7 @@ class Surface:
     rough_picture: Value = None  # `roughness` is its mean then
     by_place: ByPlace = None
     clearcoat: ClearCoat = None
+    slope: float = 0.0    # of the diffuse part's facets (Oren-Nayar)
     burley: bool = False  # the diffuse part, of which coats take nothing
     tint: tuple = None    # of metal's edge, of what glass reflects
     absorption: tuple = None  # inside glass, 1/length
@@ -213,6 +214,7 @@ class SurfaceReader(Evaluator):
                 self.note("metallic", "Textures taken as their mean")
         if da > 0 and db > 0 and a.burley != b.burley:
             self.note("", "Diffuse parts of two models in one material, taken as the stronger one's")
+        slope = (da * a.slope + db * b.slope) / (da + db) if da + db > 0 else 0.0
         coats = [(h.scalar(), s.clearcoat) for h, s in ((f, a), (g, b)) if s.clearcoat and h.scalar() > 0]
         clearcoat = None
         if coats:
@@ -224,7 +226,7 @@ class SurfaceReader(Evaluator):
         summed = {slot: self.add(self.multiply(f, getattr(a, slot)), self.multiply(g, getattr(b, slot)))
                   for slot in (*REFLECTED, "emission", "opacity")}
         return Surface(roughness=roughness, ior=a.ior if luminance(a.glass) > luminance(b.glass) else b.ior,
-                       rough_picture=picture, by_place=by_place, clearcoat=clearcoat, burley=a.burley if da >= db else b.burley,
+                       rough_picture=picture, by_place=by_place, clearcoat=clearcoat, slope=slope, burley=a.burley if da >= db else b.burley,
                        tint=a.tint if wa >= wb else b.tint, shadows_pass=a.shadows_pass or b.shadows_pass,
                        holdout=(f.scalar() if a.holdout else 0) + (g.scalar() if b.holdout else 0) >= 0.5, **summed)
 
@@ -337,9 +339,8 @@ class SurfaceReader(Evaluator):
 
     def closure_bsdf_diffuse(self, node, stack):
         self.bumps(node, stack)
-        if self.number(node.inputs["Roughness"], stack, "roughness") > 0:
-            self.note("", "Rough diffuse (Oren-Nayar) taken as Lambert")
-        return Surface(diffuse=self.value(node.inputs["Color"], stack))
+        slope = min(1.0, max(0.0, self.number(node.inputs["Roughness"], stack, "roughness")))
+        return Surface(diffuse=self.value(node.inputs["Color"], stack), slope=slope)
 
     def metal(self, node, colour, gloss):
         """The colour; darker where the node lets rough metal lose light. A picture of roughness counts by its mean."""
@@ -745,7 +746,12 @@ class Materials:
         coat, diffuse = surface.coat, surface.diffuse
         matt = metal + glass + luminance(coat) + luminance(surface.gloss) <= 0 and surface.clearcoat is None
         if matt and not (surface.burley and d > 0):
+            if surface.slope > 0 and d > 0:
+                m.flags |= library.OREN_NAYAR | (0 if bpy.app.version >= (4, 3, 0) else library.FACETS_ONCE)
+                m.roughness = surface.slope
             return {"diffuse": diffuse, "specular": ZERO}
+        if surface.slope > 0 and d > 0:
+            self.report.note(name, "Rough diffuse (Oren-Nayar) mixed with gloss, taken as Lambert")
         m.flags |= library.GGX
         if surface.burley and luminance(surface.gloss) <= 0:
             m.flags |= library.BURLEY

@@ -111,6 +111,10 @@ def cases():
     yield "textured roughness", textured(m, node.inputs["Roughness"], picture("wear", lambda x, y: x)), True, 0.03
     m, node = principled("Rusty", **{"Base Color": GOLD, "Roughness": 0.5})
     yield "textured metallic", textured(m, node.inputs["Metallic"], picture("rust", lambda x, y: (x > 0.5) * 1.0)), True, 0.025
+    for roughness in (0.4, 1.0):
+        m = h.material("Clay")
+        h.shader(m, "ShaderNodeBsdfDiffuse", Color=(*GOLD, 1), Roughness=roughness)
+        yield f"rough diffuse {roughness}", m, False, 0.015
 
 
 def measure():

@@ -401,7 +401,7 @@ class Interface(Blender):
         self.assertTrue(result.get("ok"), result.get("failure"))
         self.assertTrue(result["offered"])
         self.assertEqual((result["render"], result["cancel"]), ("complete", "cancel"))
-        self.assertTrue(any("Oren-Nayar" in note and "cloth" in note for note in result["notes"]))
+        self.assertTrue(any("Shaders taken as diffuse" in note for note in result["notes"]))
         self.assertEqual(result["levels"], 3)
         # The interface's own timer went on while the worker rendered.
         self.assertGreater(result["ticks_while_rendering"], 5)

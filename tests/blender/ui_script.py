@@ -93,7 +93,12 @@ def steps():
 
     # A frame, of a scene with something that is approximated.
     cloth = next(n for n in bpy.data.materials["cloth"].node_tree.nodes if n.type == "BSDF_DIFFUSE")
-    cloth.inputs["Roughness"].default_value = 0.5
+    tree = bpy.data.materials["cloth"].node_tree
+    toon, both = tree.nodes.new("ShaderNodeBsdfToon"), tree.nodes.new("ShaderNodeMixShader")
+    surface = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL").inputs["Surface"]
+    tree.links.new(cloth.outputs[0], both.inputs[1])
+    tree.links.new(toon.outputs[0], both.inputs[2])
+    tree.links.new(both.outputs[0], surface)
     bpy.app.handlers.render_complete.append(on_complete)
     bpy.app.handlers.render_cancel.append(on_cancel)
     bpy.ops.render.render("INVOKE_DEFAULT")

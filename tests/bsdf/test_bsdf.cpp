@@ -283,6 +283,69 @@ TEST(Bsdf, CoatsOfBurleysSurfacesTakeNothingFromThem) {
   EXPECT_GT(coated.evaluate(light).x, bare.evaluate(light).x);
 }
 
+Material grooved(const Rgb& base, float slope, bool once) {
+  Material m;
+  m.oren_nayar = true, m.facets_once = once, m.diffuse = base, m.roughness = slope;
+  return m;
+}
+
+// Mean of t over the light's projected solid angle, times π. [Fujii 2012; Portsmouth, Kutz, Hill 2024]
+double groove_integral(double cosine) {
+  const double angle = std::acos(cosine), sine = std::sin(angle);
+  return sine * (angle - 2.0 / 3 - sine * cosine) + 2.0 / 3 * sine / cosine * (1 - sine * sine * sine);
+}
+
+double oren_nayar_brdf(double slope, double color, bool once, const Vec3f& view, const Vec3f& light) {
+  const double a = 1 / (std::numbers::pi + slope * (std::numbers::pi / 2 - 2.0 / 3)), b = slope * a;
+  const double s = dot(view, light) - view.z * light.z, t = s > 0 ? s / std::max(view.z, light.z) : s;
+  if (once) return color * (a + b * t);
+  const auto kept = [&](double c) { return a * std::numbers::pi + b * groove_integral(c); };
+  const double mean = a * std::numbers::pi + b * (2 * std::numbers::pi - 5.6) / 3;
+  const double series = color * color * mean / (1 - mean) / (1 - color * (1 - mean)) / std::numbers::pi;
+  return color * (a + b * t + series * (1 - kept(view.z)) * (1 - kept(light.z)));
+}
+
+// What comes back between facets has an edge that is a polynomial's, to 2e-3 of it.
+TEST(Bsdf, OrenNayarsDiffuseIsFujiisAndReciprocal) {
+  Rng rng(33, Stage::test);
+  for (int i = 0; i < 4000; ++i) {
+    const bool once = i % 2 == 0;
+    const float grey = rng.next_float(), slope = rng.next_float();
+    const Material m = grooved({grey, grey, grey}, slope, once);
+    const Vec3f view = direction_at(0.02 + 0.98 * rng.next_float(), 6.28 * rng.next_float()),
+                light = direction_at(0.02 + 0.98 * rng.next_float(), 6.28 * rng.next_float());
+    const double there = seen_from(view, m).evaluate(light).x, back = seen_from(light, m).evaluate(view).x;
+    const double expected = oren_nayar_brdf(slope, grey, once, view, light), tolerance = 1e-5 + 4e-3 * expected;
+    ASSERT_NEAR(there, expected, tolerance) << slope << " " << once;
+    ASSERT_NEAR(there, back, tolerance);
+  }
+}
+
+TEST(Bsdf, EvenLightOnOrenNayarsSurfacesComesBackAsItsFormulaSays) {
+  for (const bool once : {false, true})
+    for (const float slope : {0.2f, 0.6f, 1.0f})
+      for (const float cosine : {0.05f, 0.2f, 0.5f, 0.8f, 1.0f}) {
+        const Vec3f view = direction_at(cosine, 0);
+        const Material m = grooved({1.0f, 0.6f, 0.1f}, slope, once);
+        const Bsdf bsdf = seen_from(view, m);
+        const Rgb virtual_light = bsdf.lambertian_intensity({1, 1, 1}) * std::numbers::pi_v<float>;
+        constexpr int kCosines = 400, kTurns = 128;
+        for (int k = 0; k < 3; ++k) {
+          double formula = 0, ours = 0;
+          for (int i = 0; i < kCosines; ++i)
+            for (int j = 0; j < kTurns; ++j) {
+              const Vec3f light = direction_at(std::sqrt((i + 0.5) / kCosines), 6.2831853 * j / kTurns);
+              formula += oren_nayar_brdf(slope, m.diffuse[k], once, view, light);
+              ours += bsdf.evaluate(light)[k];
+            }
+          const double norm = std::numbers::pi / (kCosines * kTurns);
+          EXPECT_NEAR(ours * norm, formula * norm, 2e-3) << slope << " " << cosine << " " << once;
+          EXPECT_NEAR(virtual_light[k], formula * norm, 2e-3) << slope << " " << cosine << " " << once;
+          EXPECT_LE(ours * norm, 1.002) << "a furnace";
+        }
+      }
+}
+
 TEST(Bsdf, AMirrorOfAnyIndexAndItsWhiteBaseGiveBackAllLight) {
   for (const float ior : {0.1f, 0.3f, 0.5f, 0.67f, 0.9f, 1.1f, 1.5f, 3.0f, 10.0f})
     for (const float cosine : {0.05f, 0.3f, 0.6f, 0.8f, 0.9f, 1.0f}) {

@@ -64,6 +64,7 @@ SurfacePoint random_point(Rng& rng, int kind) {
     p.lobe = kLobe<GgxReflection>, p.shape = std::pow(kLeastAlpha, rng.next_float());
     p.grazing = color(), p.falloff = rng.next_float(), p.ior = 0.5f + 4.0f * rng.next_float();
     if (rng.next_below(2) == 0) p.retro = 2.0f * rng.next_float(), p.dim = 0.5f;
+    if (rng.next_below(2) == 0) p.slope = rng.next_float(), p.again = rng.next_float();
   }
   return p;
 }

@@ -32,6 +32,7 @@ inline SurfacePoint random_surface(Rng& rng, float half, bool glossy) {
       const float share = rng.next_float();
       p.retro = 2.0f * rng.next_float() * share, p.dim = 0.5f * share;
     }
+    if (rng.next_below(3) == 0) p.slope = rng.next_float(), p.again = 0.5f * rng.next_float();
     if (rng.next_below(4) == 0) p.diffuse = {};
     if (rng.next_below(4) == 0) p.smooth = normalize(p.normal + random_direction(rng) * rng.next_float());
   }

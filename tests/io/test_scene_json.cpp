@@ -385,6 +385,11 @@ TEST(SceneJson, GgxHasItsOwnParameters) {
       {{"name", "window"}, {"model", "ggx"}, {"transmission", 1}, {"roughness", 0}, {"shadows_pass", true}});
   EXPECT_EQ(read_scene(folder.write("scene.json", scene.dump())).materials.back().values.flags,
             uint32_t{LUMICUT_GGX | LUMICUT_SHADOWS_PASS});
+  scene["materials"].push_back({{"name", "clay"}, {"oren_nayar", "once"}, {"roughness", 0.25}});
+  const lumicut_material clay = read_scene(folder.write("scene.json", scene.dump())).materials.back().values;
+  EXPECT_EQ(clay.flags, uint32_t{LUMICUT_OREN_NAYAR | LUMICUT_FACETS_ONCE});
+  EXPECT_EQ(clay.roughness, 0.25f);
+  expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"oren_nayar", "often"}}), {"oren_nayar", "not of the model"});
   expect_in(wrong({{"name", "a"}, {"shadows_pass", true}}), {"shadows_pass", "\"ggx\" alone"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"shadows_pass", true}}),
             {"shadows_pass", "needs a \"transmission\" above 0"});

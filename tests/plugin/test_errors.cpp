@@ -164,6 +164,10 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
       {[](M& m) { m.flags = LUMICUT_PHONG | LUMICUT_GGX; }, "lumicut_material[3].flags: holds both"},
       {[](M& m) { m.specular_tint[1] = 1.5f; }, "lumicut_material[3].specular_tint[1]: 1.5 is not in [0, 1]"},
       {[](M& m) { m.absorption[1] = -2; }, "lumicut_material[3].absorption[1]: -2"},
+      {[](M& m) { m.flags = LUMICUT_OREN_NAYAR | LUMICUT_GGX; },
+       "lumicut_material[3].flags: holds both LUMICUT_OREN_NAYAR and LUMICUT_GGX"},
+      {[](M& m) { m.flags = LUMICUT_FACETS_ONCE; },
+       "lumicut_material[3].flags: holds LUMICUT_FACETS_ONCE without LUMICUT_OREN_NAYAR"},
       {[](M& m) { m.flags = LUMICUT_BURLEY; }, "lumicut_material[3].flags: holds LUMICUT_BURLEY without LUMICUT_GGX"},
       {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_BURLEY | LUMICUT_NO_FRESNEL; },
        "lumicut_material[3].flags: holds both LUMICUT_BURLEY and LUMICUT_NO_FRESNEL"},
@@ -174,7 +178,7 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
        "lumicut_material[3].flags: holds LUMICUT_SHADOWS_PASS without LUMICUT_GGX"},
       {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_SHADOWS_PASS, m.transmission = 0; },
        "lumicut_material[3].transmission: must be above 0 with LUMICUT_SHADOWS_PASS"},
-      {[](M& m) { m.flags = 256; }, "lumicut_material[3].flags: 256", LUMICUT_UNSUPPORTED},
+      {[](M& m) { m.flags = 1024; }, "lumicut_material[3].flags: 1024", LUMICUT_UNSUPPORTED},
   };
   for (const auto& w : wrongs) {
     auto m = materials();

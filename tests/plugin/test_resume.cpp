@@ -99,6 +99,8 @@ std::vector<Change> scene_changes() {
       material("material.normal_texture", [](M& m) { m.normal_texture = 1; }),
       material("material.normal_strength", [](M& m) { m.normal_strength = 0.5f; }),
       material("material.translucency_texture", [](M& m) { m.translucency_texture = 1; }),
+      material("material.flags (Oren and Nayar)",
+               [](M& m) { m.flags = (m.flags & ~uint32_t{LUMICUT_GGX | LUMICUT_BURLEY}) | LUMICUT_OREN_NAYAR; }),
       material("material.flags (Burley)", [](M& m) { m.flags |= LUMICUT_BURLEY; }),
       material("material.flags (shadows pass)", [](M& m) { m.flags |= LUMICUT_SHADOWS_PASS, m.transmission = 0.5f; }),
       material("material.specular_tint",

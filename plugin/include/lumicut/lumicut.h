@@ -159,6 +159,8 @@ enum {
   LUMICUT_SHADOWS_PASS = 32,
   LUMICUT_BUMP_SHADOWS = 128, /* bent normals, of normal and height textures: the diffuse part is dimmed where light comes flatter
                                  than it seems, as Cycles has it */
+  LUMICUT_OREN_NAYAR = 256,  /* not with LUMICUT_GGX: the diffuse part is Oren and Nayar's (Fujii's form), facets of the slope `roughness` */
+  LUMICUT_FACETS_ONCE = 512, /* with that: what the facets reflect more than once is lost (Blender before 4.3) */
   LUMICUT_HOLDOUT = 64 /* camera rays that meet it show black, and count in no channel: alpha is 0 there. Other rays see it */
 };
 
