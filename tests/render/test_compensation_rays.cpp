@@ -128,7 +128,7 @@ TEST(CompensationRays, MoreOfThemChangeNoMeanAndLessenItsNoise) {
   const double deviation = std::sqrt(variance / (192.0 * static_cast<double>(seeds))) / mean;
   RecordProperty("ratio", std::to_string(many / mean) + " +- " + std::to_string(deviation));
   RecordProperty("variance", std::to_string(less / variance));
-  EXPECT_NEAR(many / mean, 1.0, test::kSanitized ? 0.2 : 3 * deviation + 0.01);
+  EXPECT_NEAR(many / mean, 1.0, test::kSanitized ? 0.6 : 3 * deviation + 0.01);
   // Four seeds know no variance: it is of few bright pixels.
   if (!test::kSanitized) {
     EXPECT_LT(less, 0.4 * variance) << "an eighth, and what is not theirs";
@@ -145,7 +145,7 @@ TEST(CompensationRays, ThatGlintsGuideChangeNoMeanAndHaveFarLessNoise) {
   const double deviation = std::sqrt(variance / (192.0 * static_cast<double>(seeds))) / mean;
   RecordProperty("ratio", std::to_string(guided / mean) + " +- " + std::to_string(deviation));
   RecordProperty("variance", std::to_string(less / variance));
-  EXPECT_NEAR(guided / mean, 1.0, test::kSanitized ? 0.2 : 3 * deviation + 0.01);
+  EXPECT_NEAR(guided / mean, 1.0, test::kSanitized ? 0.6 : 3 * deviation + 0.01);
   if (!test::kSanitized) {
     EXPECT_LT(less, 0.1 * variance) << "measured: a hundredth";
   }
