@@ -19,7 +19,7 @@ std::vector<double> GlintGuide::places_of(std::span<const Glint> glints) {
 }
 
 GlintGuide::GlintGuide(std::span<const Glint> glints, const Progress* progress)
-    : glints_(glints.begin(), glints.end()), tree_(places_of(glints), 3, progress) {}
+    : glints_(glints), tree_(places_of(glints), 3, progress) {}
 
 GlintGuide::Directions GlintGuide::at(const Vec3f& position, const Vec3f& normal,
                                       BallQueryTree::Scratch& scratch) const {

@@ -17,7 +17,7 @@ class GlintGuide {
  public:
   static constexpr size_t kNearest = 16;
 
-  // Throws Error(cancelled).
+  // The glints outlive this. Throws Error(cancelled).
   GlintGuide(std::span<const Glint> glints, const Progress* progress);
 
   // Of one place: lobes [Fisher 1953] around the directions that its nearest glints came from.
@@ -39,7 +39,7 @@ class GlintGuide {
 
  private:
   static std::vector<double> places_of(std::span<const Glint> glints);
-  std::vector<Glint> glints_;
+  std::span<const Glint> glints_;
   BallQueryTree tree_;
 };
 

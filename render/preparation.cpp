@@ -33,7 +33,6 @@ void Prepared::place_lights(LightSource source, const Progress& progress) {
   clamp = std::make_unique<const Clamp>(*vpls, common, *scene, progress);
   standing_off = off_surfaces(*vpls, *scene);
   clamp->set_on(standing_off, progress);
-  if (common.compensate && !vpls->glints.empty()) glints = std::make_unique<const GlintGuide>(vpls->glints, &progress);
   standing_off.profiles.prefer(scene->profiles());
   // One distance for all, without compensation, clamps direct light too, as in the papers.
   const double within = clamp->lights_on_emitters(vpls->extended);

@@ -10,7 +10,6 @@
 #include "integrators/integrator.h"
 #include "lights/camera_importance.h"
 #include "render/clamp.h"
-#include "render/glint_guide.h"
 #include "render/nearby_lights.h"
 
 namespace lumicut {
@@ -32,7 +31,6 @@ struct Prepared {
   std::unique_ptr<const Clamp> clamp;                  // of `vpls`
   std::unique_ptr<const NearLights> near;              // null: the clamp takes no direct light that comes back
   std::unique_ptr<const NearbyLights> nearby;          // of `near`
-  std::unique_ptr<const GlintGuide> glints;            // of `vpls`; null: none, or nothing is compensated
   VplSet standing_off;  // `vpls`, off their surfaces and clamped: what the method shades with
   std::optional<Params> params;
   std::unique_ptr<Integrator> method;

@@ -41,7 +41,6 @@ FrameLight RenderLoop::frame_light(const Prepared& prepared) const {
   light.trace_gloss = light.compensated != nullptr && prepared.params->common().trace_gloss &&
                       prepared.vpls->light_paths > 0 && may_trace_gloss(scene_);
   if (light.trace_gloss && sky_ && prepared.vpls->of_sky > 0) light.sky = &*sky_;
-  light.glints = prepared.glints.get();
   light.spheres = sphere_scale(prepared.params->common()) > 0.0f;
   return light;
 }
@@ -169,7 +168,11 @@ void RenderLoop::render_iterations(Progress& progress, Stats& stats,
     frame.camera_samples = {preparation_.params.common().seed, uint64_t{done} * frame.samples};
     FrameLight light = frame_light(prepared);
     std::vector<uint8_t> rays;
-    if (light.compensated != nullptr) light.rays = rays = compensation_rays(mean, film_, done, progress);
+    std::optional<GlintGuide> glints;
+    if (light.compensated != nullptr) {
+      light.rays = rays = compensation_rays(mean, film_, done, progress);
+      if (!prepared.vpls->glints.empty()) light.glints = &glints.emplace(prepared.vpls->glints, &progress);
+    }
     {
       const PhaseTimer timer(stats, "render");
       render_frame(scene_, methods(prepared, of_groups, progress, stats), frame, light, *frame_film, {progress, stats},

@@ -101,7 +101,8 @@ std::pair<double, double> mean_and_variance(const Scene& scene, uint32_t rays, u
       light.nearby = prepared.nearby.get(), light.compensated = prepared.clamp.get();
       const std::vector<uint8_t> each(sum.size(), static_cast<uint8_t>(rays));
       if (rays > 0) light.rays = each;
-      if (guided) light.glints = prepared.glints.get();
+      const GlintGuide glints(prepared.vpls->glints, &progress);
+      if (guided) light.glints = &glints;
       const GroupMethod method{0, prepared.method.get()};
       render_frame(scene, {&method, 1}, frame, light, film, {progress, stats}, [](const Rect&) {});
     });

@@ -34,7 +34,8 @@ int part_of(const Vec3f& d) {
 }
 
 TEST(GlintGuide, SamplesAsItsDensityHasItWhichSumsToOne) {
-  const GlintGuide guide(glints_of_two_patches(), nullptr);
+  const auto glints = glints_of_two_patches();
+  const GlintGuide guide(glints, nullptr);
   BallQueryTree::Scratch scratch;
   for (const Vec3f place : {Vec3f{0, 0, 0}, Vec3f{0, 0.9f, -0.7f}, Vec3f{0, 0.5f, 0.1f}}) {
     const auto directions = guide.at(place, {1, 0, 0}, scratch);
@@ -75,7 +76,8 @@ TEST(GlintGuide, SamplesAsItsDensityHasItWhichSumsToOne) {
 }
 
 TEST(GlintGuide, LooksWhereTheLightCameFrom) {
-  const GlintGuide guide(glints_of_two_patches(), nullptr);
+  const auto glints = glints_of_two_patches();
+  const GlintGuide guide(glints, nullptr);
   BallQueryTree::Scratch scratch;
   const auto directions = guide.at({0, 0, 0}, {1, 0, 0}, scratch);
   const float first = directions.pdf(normalize(Vec3f{1.5f, 0.05f, 0.05f})),
