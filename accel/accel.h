@@ -20,6 +20,9 @@ inline constexpr uint32_t kNoId = 0xffffffffu;
 // Limit of a scene's coordinates: the difference of two is a valid direction in every backend.
 inline constexpr float kLargestCoordinate = 9e17f;
 
+// A flag of rays of occlusion queries: they run from a light to what it lights. Without it, the other way.
+inline constexpr uint32_t kFromLight = 1;
+
 // Fields in Embree's order (RTCRay). `dir` need not be a unit vector; distances are in units of its length.
 struct Ray {
   Vec3f org;
@@ -29,7 +32,9 @@ struct Ray {
   float tfar = std::numeric_limits<float>::infinity();  // shortened to the hit; -inf when found occluded
   uint32_t mask = 0xffffffffu;                          // a mesh is seen when (mesh.mask & ray.mask) != 0
   uint32_t id = 0;
-  uint32_t flags = 0;
+  uint32_t flags = 0;  // kFromLight; others are ignored
+
+  Vec3f towards_light() const { return (flags & kFromLight) != 0 ? -dir : dir; }
 };
 
 // Fields in Embree's order (RTCHit). `ng` is not normalised and is in the mesh's own space: an instance's transform has
@@ -47,7 +52,8 @@ struct RayHit {
   Hit hit;
 };
 
-// Where a ray meets a surface. `dir`, of any length, is in the mesh's own space.
+// Where a ray meets a surface. `dir`, of any length, is in the mesh's own space: the ray's, of occlusion queries the one
+// towards the light.
 struct CandidateHit {
   uint32_t mesh, inst, prim;  // as in Hit
   float u, v;
@@ -99,11 +105,15 @@ struct AccelInfo {
   Aabb bounds;
 };
 
-// Where all rays of a bundle begin: a point, or the unit direction towards a light at infinity.
+// Where all rays of a bundle begin: a light's point, or the unit direction towards a light at infinity. With `to_lights`
+// they begin at a point that lights of other places light.
 struct BundleOrigin {
   Vec3f light;
   bool directional = false;
   uint32_t mask = 0xffffffffu;  // as Ray::mask
+  bool to_lights = false;
+
+  uint32_t ray_flags() const { return directional || to_lights ? 0 : kFromLight; }
 };
 
 class Accel {

@@ -67,6 +67,11 @@ CandidateHit candidate(const RTCFilterFunctionNArguments* args, uint32_t mesh, u
           RTCHitN_v(args->hit, n, i),
           {RTCRayN_dir_x(args->ray, n, i), RTCRayN_dir_y(args->ray, n, i), RTCRayN_dir_z(args->ray, n, i)}};
 }
+CandidateHit light_candidate(const RTCFilterFunctionNArguments* args, uint32_t mesh, unsigned i) {
+  CandidateHit hit = candidate(args, mesh, i);
+  if ((RTCRayN_flags(args->ray, args->N, i) & kFromLight) != 0) hit.dir = -hit.dir;
+  return hit;
+}
 void on_filter(const RTCFilterFunctionNArguments* args) {
   const auto& user = *static_cast<const FilterUser*>(args->geometryUserPtr);
   for (unsigned i = 0; i < args->N; ++i)
@@ -76,7 +81,7 @@ void on_filter(const RTCFilterFunctionNArguments* args) {
 void on_light_filter(const RTCFilterFunctionNArguments* args) {
   const auto& user = *static_cast<const FilterUser*>(args->geometryUserPtr);
   for (unsigned i = 0; i < args->N; ++i)
-    if (args->valid[i] != 0 && user.filter->passes_light(candidate(args, user.mesh, i))) args->valid[i] = 0;
+    if (args->valid[i] != 0 && user.filter->passes_light(light_candidate(args, user.mesh, i))) args->valid[i] = 0;
 }
 
 // Embree binds an allocator of each building thread to the scene's. When memory runs out during that, it stays bound to
@@ -148,7 +153,8 @@ class EmbreeAccel final : public Accel {
 
   void occluded_from_point(const BundleOrigin& origin, const float* px, const float* py, const float* pz, size_t n,
                            uint8_t* out) const override {
-    const auto& [light, directional, mask] = origin;
+    const Vec3f light = origin.light;
+    const bool directional = origin.directional;
     embree::Context context(coherent_);
     constexpr size_t kWidth = 16;
     Packet<kWidth> packet;
@@ -158,7 +164,7 @@ class EmbreeAccel final : public Accel {
     for (size_t i = 0; i < kWidth; ++i) {
       for (int axis = 0; axis < 3; ++axis) packet.org[axis][i] = packet.dir[axis][i] = light[axis];
       packet.tnear[i] = packet.time[i] = 0.0f;
-      packet.mask[i] = mask, packet.id[i] = packet.flags[i] = 0;
+      packet.mask[i] = origin.mask, packet.flags[i] = origin.ray_flags(), packet.id[i] = 0;
     }
     const float reach = directional ? std::numeric_limits<float>::infinity() : 0x1.fffffep-1f;
     for (size_t begin = 0; begin < n; begin += kWidth) {

@@ -54,14 +54,14 @@ class HostAccel final : public Accel {
 
   void occluded_from_point(const BundleOrigin& origin, const float* px, const float* py, const float* pz, size_t n,
                            uint8_t* out) const override {
-    const auto& [light, directional, mask] = origin;
     if (n == 0) return;
     std::vector<Ray> rays(n);
     for (size_t i = 0; i < n; ++i) {
       const Vec3f p{px[i], py[i], pz[i]};
-      rays[i].org = directional ? p : light;
-      rays[i].dir = directional ? light : p - light;
-      rays[i].tfar = directional ? kInf : 0x1.fffffep-1f, rays[i].mask = mask;
+      rays[i].org = origin.directional ? p : origin.light;
+      rays[i].dir = origin.directional ? origin.light : p - origin.light;
+      rays[i].tfar = origin.directional ? kInf : 0x1.fffffep-1f;
+      rays[i].mask = origin.mask, rays[i].flags = origin.ray_flags();
     }
     HostAccel::occluded(rays);
     for (size_t i = 0; i < n; ++i) out[i] = rays[i].tfar == -kInf;
@@ -100,7 +100,7 @@ class HostAccel final : public Accel {
   bool lets_pass(const RayHit& r) const {
     const Hit& h = r.hit;
     if (!geometry_.meshes[h.geom].passes_light) return false;
-    Vec3f dir = r.ray.dir;
+    Vec3f dir = r.ray.towards_light();
     if (h.inst != kNoId) {
       if (!inverses_[h.inst]) return false;
       dir = inverses_[h.inst]->vector(dir);

@@ -149,7 +149,7 @@ std::array<std::optional<BsdfSample>, 3> Bsdf::specular_ways(float u, float v, P
 std::optional<BsdfSample> Bsdf::specular_way(std::optional<Way> way, float choice, float u, float v,
                                              Passage passage) const {
   if (!specular_) return {};
-  const bool straight = parameters_.shadows_pass && passage == Passage::straight;
+  const bool straight = parameters_.shadows_pass && passage != Passage::refracted;
   const GgxColors& c = colors_;
   const Frame frame(normal_);
   Vec3f view = frame.to_local(to_viewer_);
@@ -161,7 +161,7 @@ std::optional<BsdfSample> Bsdf::specular_way(std::optional<Way> way, float choic
   float alpha = c.alpha;
   Vec3f h = half_vector(alpha);
   const float cosine = std::min(1.0f, std::max(0.0f, dot(view, h)));
-  const bool inside = behind_ && !straight;
+  const bool inside = behind_ && (!straight || parameters_.open_glass);
   const float ratio = inside ? 1.0f / parameters_.ior : parameters_.ior;
   float refracted = 0.0f;
   Rgb reflected{}, passed{};
@@ -185,7 +185,8 @@ std::optional<BsdfSample> Bsdf::specular_way(std::optional<Way> way, float choic
     if (smooth_coat(parameters_.coat, parameters_.coat_alpha))
       of_coat = coat_reflectance(coat, dot(view, half_vector(coat.alpha)));
   }
-  if (straight) passed = straight_transmittance(parameters_, dot(side_, to_viewer_));
+  if (straight)
+    passed = straight_transmittance(parameters_, dot(side_, to_viewer_), behind_ == (passage == Passage::straight));
   const float most_reflected = max_component(reflected), most_passed = max_component(passed);
   const float sum = most_reflected + most_passed + of_coat;
   if (!(sum > 0.0f)) return {};
@@ -241,7 +242,7 @@ static Vec3f turned(const Vec3f& direction, const Vec3f& from, const Vec3f& to) 
 std::optional<ScatterSample> Bsdf::scatter(Rng& rng) const {
   if (parameters_.model != LobeModel::ggx && !translucent() && !layers_[0].grooved()) return scatter_cosine(rng);
   const float choice = rng.next_float(), u = rng.next_float(), v = rng.next_float(), lobe = rng.next_float();
-  const auto specular = sample_specular(lobe, u, v, Passage::straight);
+  const auto specular = sample_specular(lobe, u, v, Passage::straight_from_light);
   const float q_specular = specular ? std::min(1.0f, max_component(specular->weight)) : 0.0f;
   float reflected = 0.0f;
   for (const SurfacePoint& p : layers()) reflected += largest_albedo(p);

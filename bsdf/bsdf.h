@@ -43,7 +43,7 @@ struct PathChoice {
 
 // How a ray goes through glass: bent, as the camera sees it, or, where the material says that shadows pass, straight on, as
 // light does on its way to the first surface that is seen.
-enum class Passage : uint8_t { refracted, straight };
+enum class Passage : uint8_t { refracted, straight, straight_from_light };
 
 class Bsdf {
  public:

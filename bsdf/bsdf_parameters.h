@@ -27,6 +27,7 @@ struct BsdfParameters {
   float coat = 0.0f, coat_alpha = 0.0f, coat_ior = 1.5f;  // a clear layer over all of this; `coat`: its share
   const GlassAlbedo* glass = nullptr;                     // of that ior, for rough glass
   bool shadows_pass = false;                              // light goes straight through its glass
+  bool open_glass = false;                                // which has no second border
   Rgb absorption{};                                       // inside that, for each unit of length
 };
 

@@ -15,7 +15,9 @@ inline constexpr float kSharpAlpha = 1e-3f;    // facets below turn directions b
 
 // Share that goes straight on through one border, for the cosine to the geometric normal. Either side counts as the outer
 // one: in a slab light that was not bent meets the second border as it met the first, and is not totally reflected there.
-inline Rgb straight_transmittance(const BsdfParameters& m, float cosine) {
+// `from_inside`: whether what is lit lies behind the surface. In glass that is open there it has the light of the other side in
+// a narrower cone; radiance keeps its value through borders here, so that so much less arrives.
+inline Rgb straight_transmittance(const BsdfParameters& m, float cosine, bool from_inside) {
   const float clear = m.fresnel ? (1.0f - m.metallic) * m.transmission : 0.0f;
   if (!(clear > 0.0f)) return {};
   cosine = std::min(1.0f, std::abs(cosine));
@@ -24,6 +26,7 @@ inline Rgb straight_transmittance(const BsdfParameters& m, float cosine) {
   float share =
       clear * (rough ? m.glass->passed(m.alpha, cosine) : 1.0f - fresnel_reflectance(cosine, m.ior, refracted));
   if (m.coat > 0.0f && !m.additive) share *= clear_coat(m, cosine).transmittance.to_viewer;
+  if (m.open_glass && from_inside) share = std::min(1.0f, share / (m.ior * m.ior));
   Rgb passed{};
   for (int k = 0; k < 3; ++k) passed[k] = share * std::sqrt(std::max(0.0f, m.diffuse[k]));
   return passed;

@@ -72,7 +72,7 @@ inline void trace_shadows(const Accel& accel, const Vpl& light, const float* x, 
     for (size_t i = 0; i < count; ++i) {
       const Vec3f point{x[begin + i], y[begin + i], z[begin + i]};
       rays[i].org = place_facing(light, point), rays[i].dir = point - rays[i].org;
-      rays[i].tfar = 0x1.fffffep-1f, rays[i].mask = light.ray_mask;
+      rays[i].tfar = 0x1.fffffep-1f, rays[i].mask = light.ray_mask, rays[i].flags = kFromLight;
     }
     accel.occluded({rays, count});
     for (size_t i = 0; i < count; ++i) occluded[begin + i] = rays[i].tfar < 0.0f;

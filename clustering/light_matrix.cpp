@@ -72,7 +72,7 @@ struct Tile {
           index[n++] = static_cast<uint32_t>(l);
         }
         if (n == 0) continue;
-        scene.accel().occluded_from_point({rows.position_at(r), false, mask}, x, y, z, n, occluded);
+        scene.accel().occluded_from_point({rows.position_at(r), false, mask, true}, x, y, z, n, occluded);
         for (size_t i = 0; i < n; ++i)
           if (occluded[i]) row[index[i]] *= shadowed_share;
         rays += n;

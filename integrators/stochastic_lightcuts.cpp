@@ -153,7 +153,7 @@ class StochasticLightcuts final : public Integrator {
         ray.org = point.position, ray.dir = -light.normal;
       } else {
         ray.org = shadow_origin(light, point.position).light, ray.dir = point.position - ray.org,
-        ray.tfar = 0x1.fffffep-1f;
+        ray.tfar = 0x1.fffffep-1f, ray.flags = kFromLight;
       }
       work.rays.push_back(ray);
       work.light.push_back(given);

@@ -317,6 +317,11 @@ class SceneReader {
       if (!ggx) shadows->fail("is of the model \"ggx\" alone");
       set_flag(LUMICUT_SHADOWS_PASS, shadows->boolean());
     }
+    const auto open = object.find("open_glass");
+    if (open) {
+      if (!ggx) open->fail("is of the model \"ggx\" alone");
+      set_flag(LUMICUT_OPEN_GLASS, open->boolean());
+    }
     if (!ggx) m.flags &= ~uint32_t{LUMICUT_NO_FRESNEL | LUMICUT_BURLEY | LUMICUT_SHADOWS_PASS};
     if (auto tint = object.find("specular_tint")) {
       if (!ggx) tint->fail("is of the model \"ggx\" alone");
@@ -343,6 +348,10 @@ class SceneReader {
     if ((m.flags & LUMICUT_SHADOWS_PASS) != 0 && !(m.transmission > 0.0f)) {
       if (shadows) shadows->fail("needs a \"transmission\" above 0");
       m.flags &= ~uint32_t{LUMICUT_SHADOWS_PASS};  // of the material that this one changes
+    }
+    if ((m.flags & LUMICUT_OPEN_GLASS) != 0 && (m.flags & LUMICUT_SHADOWS_PASS) == 0) {
+      if (open) open->fail("needs \"shadows_pass\"");
+      m.flags &= ~uint32_t{LUMICUT_OPEN_GLASS};
     }
     number("ior", m.ior, 0.1, 10, ggx);
     number("coat", m.coat, 0, 1, ggx);

@@ -300,6 +300,7 @@ class Writer {
       out["roughness"] = m.roughness;
     }
     flag(LUMICUT_SHADOWS_PASS, "shadows_pass", true);
+    flag(LUMICUT_OPEN_GLASS, "open_glass", true);
     flag(LUMICUT_EMIT_BOTH_SIDES, "emit_both_sides", true);
     flag(LUMICUT_HOLDOUT, "holdout", true);
     flag(LUMICUT_BUMP_SHADOWS, "bump_shadows", true);

@@ -93,7 +93,8 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   const FieldValidator c("lumicut_material", index);
   c.flags("flags", in.flags,
           LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG | LUMICUT_GGX | LUMICUT_NO_FRESNEL | LUMICUT_BURLEY |
-              LUMICUT_SHADOWS_PASS | LUMICUT_HOLDOUT | LUMICUT_BUMP_SHADOWS | LUMICUT_OREN_NAYAR | LUMICUT_FACETS_ONCE);
+              LUMICUT_SHADOWS_PASS | LUMICUT_HOLDOUT | LUMICUT_BUMP_SHADOWS | LUMICUT_OREN_NAYAR | LUMICUT_FACETS_ONCE |
+              LUMICUT_OPEN_GLASS);
   if ((in.flags & LUMICUT_PHONG) != 0 && (in.flags & LUMICUT_GGX) != 0)
     c.fail("flags", "holds both LUMICUT_PHONG and LUMICUT_GGX");
   if ((in.flags & LUMICUT_NO_FRESNEL) != 0) {
@@ -109,6 +110,8 @@ Material to_material(const lumicut_material& in, uint64_t index) {
     c.fail("flags", "holds both LUMICUT_OREN_NAYAR and LUMICUT_GGX");
   if ((in.flags & LUMICUT_FACETS_ONCE) != 0 && (in.flags & LUMICUT_OREN_NAYAR) == 0)
     c.fail("flags", "holds LUMICUT_FACETS_ONCE without LUMICUT_OREN_NAYAR");
+  if ((in.flags & LUMICUT_OPEN_GLASS) != 0 && (in.flags & LUMICUT_SHADOWS_PASS) == 0)
+    c.fail("flags", "holds LUMICUT_OPEN_GLASS without LUMICUT_SHADOWS_PASS");
   if ((in.flags & LUMICUT_SHADOWS_PASS) != 0) {
     if ((in.flags & LUMICUT_GGX) == 0) c.fail("flags", "holds LUMICUT_SHADOWS_PASS without LUMICUT_GGX");
     if (!(in.transmission > 0.0f)) c.fail("transmission", "must be above 0 with LUMICUT_SHADOWS_PASS");
@@ -137,7 +140,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   m.fresnel = (in.flags & LUMICUT_NO_FRESNEL) == 0;
   m.burley = (in.flags & LUMICUT_BURLEY) != 0;
   m.oren_nayar = (in.flags & LUMICUT_OREN_NAYAR) != 0, m.facets_once = (in.flags & LUMICUT_FACETS_ONCE) != 0;
-  m.shadows_pass = (in.flags & LUMICUT_SHADOWS_PASS) != 0;
+  m.shadows_pass = (in.flags & LUMICUT_SHADOWS_PASS) != 0, m.open_glass = (in.flags & LUMICUT_OPEN_GLASS) != 0;
   m.holdout = (in.flags & LUMICUT_HOLDOUT) != 0;
   m.bump_shadows = (in.flags & LUMICUT_BUMP_SHADOWS) != 0;
   c.range("specular_tint", in.specular_tint, 0.0f, 1.0f);

@@ -26,6 +26,7 @@ struct Material {
   float roughness = 0.5f, metallic = 0.0f, ior = 1.5f, transmission = 0.0f;
   float coat = 0.0f, coat_roughness = 0.0f, coat_ior = 1.5f;  // a clear layer over all of this; `coat`: its share
   bool shadows_pass = false;  // light goes straight through the glass, though the camera sees it bent
+  bool open_glass = false;    // which has no second border there: what lies behind the surface lies inside the glass
   Rgb absorption{};           // inside glass, for each unit of length
   bool bump_shadows = false;  // bsdf/bump_shadow.h, where normals are bent
   bool holdout = false;       // the camera sees nothing there, and nothing behind
@@ -41,9 +42,9 @@ struct Material {
   int32_t translucency_texture = -1;
   LUMICUT_FIELDS(Material, diffuse, specular, translucency, shininess, lobe, oren_nayar, facets_once, fresnel, burley,
                  specular_tint, roughness, metallic, ior, transmission, coat, coat_roughness, coat_ior, shadows_pass,
-                 absorption, bump_shadows, holdout, opacity, emission, emit_both_sides, normal_strength, normal_texture,
-                 bump_strength, bump_distance, height_texture, roughness_texture, metallic_texture, diffuse_texture,
-                 specular_texture, opacity_texture, emission_texture, translucency_texture)
+                 open_glass, absorption, bump_shadows, holdout, opacity, emission, emit_both_sides, normal_strength,
+                 normal_texture, bump_strength, bump_distance, height_texture, roughness_texture, metallic_texture,
+                 diffuse_texture, specular_texture, opacity_texture, emission_texture, translucency_texture)
 
   // Whether light that goes straight through its glass is absorbed there.
   bool absorbs_straight() const { return shadows_pass && max_component(absorption) > 0.0f; }

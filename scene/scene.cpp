@@ -109,6 +109,8 @@ bool passes_by_chance(float stops, uint32_t mesh, uint32_t prim, float u, float 
   return static_cast<float>(place >> 40) * 0x1p-24f >= stops;
 }
 
+Vec3f facing(const Vec3f& normal, const Vec3f& front) { return dot(front, normal) < 0.0f ? -normal : normal; }
+
 // Which channel of colours a ray carries, by chance of its line (unit `dir`, on a grid as above): the same at all borders
 // that it passes, where its chances are products of this channel's shares then, and their mean that of the colours' products.
 int channel_of(const Vec3f& at, const Vec3f& dir, float extent) {
@@ -372,18 +374,18 @@ bool Scene::passes_light(const CandidateHit& hit) const {
   const Mesh& mesh = meshes_[hit.mesh];
   const uint32_t id = mesh.material_of(hit.prim);
   const uint32_t instance_index = hit.inst != kNoId ? hit.inst - first_instance_[hit.mesh] : 0;
-  // Rays go from the light or to it: which side they meet is not told.
   float stops = opacity(hit.mesh, hit.prim, hit.u, hit.v, instance_index, &hit.dir, true);
   if (stops > 0.0f && materials_[id].shadows_pass) {
     const uint32_t* t = &mesh.indices[3 * size_t{hit.prim}];
     Vec3f corner = mesh.positions[t[0]];
     Vec3f edges[2] = {mesh.positions[t[1]] - corner, mesh.positions[t[2]] - corner}, dir = hit.dir;
+    Vec3f front = cross(edges[0], edges[1]);
     if (hit.inst != kNoId) {
       const Transform& to_world = instance(hit.mesh, instance_index);
       corner = to_world.point(corner), edges[0] = to_world.vector(edges[0]), edges[1] = to_world.vector(edges[1]),
-      dir = to_world.vector(dir);
+      dir = to_world.vector(dir), front = to_world.normal(front);
     }
-    const Vec3f normal = normalize(cross(edges[0], edges[1])), to_viewer = -normalize(dir);
+    const Vec3f normal = facing(normalize(cross(edges[0], edges[1])), front), to_viewer = -normalize(dir);
     const SurfaceView view{{}, normal, normal, to_viewer, 0.0f};
     std::optional<SurfaceHit> place;
     if (has_programs_) place = place_on(hit.mesh, hit.prim, hit.u, hit.v, instance_index);
@@ -393,7 +395,7 @@ bool Scene::passes_light(const CandidateHit& hit) const {
                                 &*place)
               : bsdf_parameters(id, uv_at(mesh, hit.prim, hit.u, hit.v), view);
     const float cosine = std::abs(dot(normal, to_viewer));
-    Rgb passed = straight_transmittance(glass, cosine);
+    Rgb passed = straight_transmittance(glass, cosine, dot(normal, to_viewer) < 0.0f);
     if (thickness_[hit.mesh] > 0.0f) {
       // Half of the way at each border, as slanted as light is inside.
       const float size = hit.inst != kNoId ? instance(hit.mesh, instance_index).scale() : 1.0f;
@@ -468,7 +470,7 @@ SurfaceHit Scene::surface(const RayHit& rh, bool turn_normal) const {
   if (instanced_) {
     const Vec3f local =
         cross(mesh.positions[tri[1]] - mesh.positions[tri[0]], mesh.positions[tri[2]] - mesh.positions[tri[0]]);
-    if (dot(to_world.normal(local), s.geometric_normal) < 0.0f) s.geometric_normal = -s.geometric_normal;
+    s.geometric_normal = facing(s.geometric_normal, to_world.normal(local));
   }
   if (s.geometric_normal == Vec3f{}) s.geometric_normal = normalize(-rh.ray.dir);
   s.normal = s.geometric_normal;
@@ -600,7 +602,7 @@ BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv, const Surface
   p.ior = m.ior, p.transmission = m.transmission;
   p.coat = m.coat, p.coat_alpha = m.coat_alpha(), p.coat_ior = m.coat_ior;
   p.glass = glass_[material].get();
-  p.shadows_pass = m.shadows_pass, p.absorption = m.absorption;
+  p.shadows_pass = m.shadows_pass, p.open_glass = m.open_glass, p.absorption = m.absorption;
   return p;
 }
 

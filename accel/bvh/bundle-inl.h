@@ -24,8 +24,8 @@ struct Bundle {
   HWY_ALIGN float dir[3][kBundle];      // otherwise
   HWY_ALIGN float rcp_dir[3][kBundle];  // 1/dir
   float tfar;
-  uint32_t mask;    // of the rays
-  uint64_t active;  // one bit per ray; the others may hold any value
+  uint32_t mask, flags;  // of the rays
+  uint64_t active;       // one bit per ray; the others may hold any value
 };
 
 }  // namespace

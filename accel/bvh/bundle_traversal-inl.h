@@ -110,7 +110,7 @@ class BundleTracer {
       r.org = {bundle_.origin[0][i], bundle_.origin[1][i], bundle_.origin[2][i]}, r.dir = bundle_.common;
     else
       r.org = bundle_.common, r.dir = {bundle_.dir[0][i], bundle_.dir[1][i], bundle_.dir[2][i]};
-    r.tfar = bundle_.tfar, r.mask = bundle_.mask;
+    r.tfar = bundle_.tfar, r.mask = bundle_.mask, r.flags = bundle_.flags;
     return r;
   }
 
@@ -215,7 +215,7 @@ class BundleTracer {
     HitLanes hits;
     const uint32_t hit = intersect_block<C, C::kFilters>(scene_, block, LaneRay(r.org, r.dir), hn::Zero(d4),
                                                          hn::Set(d4, r.tfar), r.mask, hits);
-    return any_lane_stops<C>(scene_, block, instance_id_, r.dir, hit, hits);
+    return any_lane_stops<C>(scene_, block, instance_id_, r, hit, hits);
   }
 
   // Traces the bundle in the space of an instance, where it has a common origin or direction again.
@@ -223,7 +223,7 @@ class BundleTracer {
     const TraceScene::Instance& in = scene_.instances[index];
     Bundle local;
     local.common = kDirectional ? local_vector(in, bundle_.common) : local_point(in, bundle_.common);
-    local.tfar = bundle_.tfar, local.mask = bundle_.mask;
+    local.tfar = bundle_.tfar, local.mask = bundle_.mask, local.flags = bundle_.flags;
     local.active = rays;
     for (size_t i = 0; i < kBundle; ++i) {
       if constexpr (kDirectional) {
@@ -254,7 +254,7 @@ HWY_NOINLINE void trace_points_in_bundles(const TraceScene& scene, const BundleO
                                           const float* py, const float* pz, size_t n, uint8_t* occluded) {
   Bundle bundle;
   const Vec3f light = origin.light;
-  bundle.common = light, bundle.mask = origin.mask;
+  bundle.common = light, bundle.mask = origin.mask, bundle.flags = origin.ray_flags();
   bundle.tfar = kDirectional ? kInf : 0x1.fffffep-1f;  // exclusive of the point itself
   for (size_t begin = 0; begin < n; begin += kBundle) {
     const size_t count = std::min(kBundle, n - begin);

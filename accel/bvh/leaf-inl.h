@@ -57,18 +57,18 @@ HWY_INLINE uint32_t intersect_block(const TraceScene& scene, const LeafBlock& bl
   return all;
 }
 
-// True when some lane of `hit` stops light along `dir`: cut-outs and glass may let it pass. Reads `hits` where the scene
+// True when some lane of `hit` stops the light of `ray`: cut-outs and glass may let it pass. Reads `hits` where the scene
 // has filters.
 template <class C>
-HWY_INLINE bool any_lane_stops(const TraceScene& scene, const LeafBlock& block, uint32_t instance_id, const Vec3f& dir,
+HWY_INLINE bool any_lane_stops(const TraceScene& scene, const LeafBlock& block, uint32_t instance_id, const Ray& ray,
                                uint32_t hit, const HitLanes& hits) {
-  (void)instance_id, (void)dir;
+  (void)instance_id, (void)ray;
   if constexpr (C::kFilters) {
     for (; hit != 0; hit &= hit - 1) {
       const int lane = __builtin_ctz(hit);
       if (!(scene.filtered[block.geom[lane]] != 0 &&
             scene.filter->passes_light(
-                {block.geom[lane], instance_id, block.prim[lane], hits.u[lane], hits.v[lane], dir})))
+                {block.geom[lane], instance_id, block.prim[lane], hits.u[lane], hits.v[lane], ray.towards_light()})))
         return true;
     }
     return false;

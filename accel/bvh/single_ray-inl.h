@@ -61,7 +61,7 @@ HWY_NOINLINE bool any_hit(const TraceScene& scene, const WideBvh& bvh, uint32_t 
       const LeafBlock& block = bvh.leaves[current & ~kLeafBit];
       HitLanes hits;
       const uint32_t hit = intersect_block<C, C::kFilters>(scene, block, lanes, tnear4, tfar4, r.mask, hits);
-      if (any_lane_stops<C>(scene, block, instance_id, r.dir, hit, hits)) return true;
+      if (any_lane_stops<C>(scene, block, instance_id, r, hit, hits)) return true;
     }
     if (top == 0) return false;
     current = stack[--top];

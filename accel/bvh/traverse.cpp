@@ -99,9 +99,9 @@ void trace_any(const TraceScene& scene, std::span<Ray> rays) {
 
 void trace_points(const TraceScene& scene, const BundleOrigin& origin, const float* px, const float* py,
                   const float* pz, size_t n, uint8_t* occluded) {
-  const auto& [light, directional, mask] = origin;
-  const bool valid = within(light, directional ? scene.limits.direction : scene.limits.origin);
-  if (scene.top->root == kEmptyChild || mask == 0 || !valid || (directional && light == Vec3f{})) {
+  const bool valid = within(origin.light, origin.directional ? scene.limits.direction : scene.limits.origin);
+  if (scene.top->root == kEmptyChild || origin.mask == 0 || !valid ||
+      (origin.directional && origin.light == Vec3f{})) {
     std::fill_n(occluded, n, uint8_t{0});
     return;
   }

@@ -32,6 +32,14 @@ def fetch(collection, attribute, count, width, dtype):
     return out.reshape(count, width) if width > 1 else out
 
 
+def is_one_layer(mesh):
+    """Whether the faces look the same way on the whole: not the two sides of a slab without a rim."""
+    count = len(mesh.polygons)
+    areas = fetch(mesh.polygons, "area", count, 1, np.float32)
+    normals = fetch(mesh.polygons, "normal", count, 3, np.float32)
+    return bool(np.linalg.norm(areas @ normals) > 0.5 * areas.sum())
+
+
 def corner_vertices(mesh, count):
     attribute = mesh.attributes.get(".corner_vert")
     if attribute is not None:  # 3.6 and later
@@ -287,7 +295,7 @@ class Collector:
         self._meshes, self._flat = {}, []  # by what they are made from; those of flat instances
         self._shapes = {}  # lists of meshes of hair, curves and points, likewise
         self._looked_at = set()
-        self._sheets = {}  # by mesh: whether it is open, and its extents
+        self._sheets = {}  # by mesh: whether it is open, one layer, and its extents
         self.instances = 0
         self.linking = linking.Linking(depsgraph, self.report)
         # Light groups by name: 0 holds all that is in none.
@@ -402,7 +410,7 @@ class Collector:
     def _add_mesh(self, instance, ob, override):
         mesh = ob.data
         slots = self._slots(ob, override)
-        for numbers, mask in self._variants(ob, slots, lambda: self._is_noted_pane(ob, mesh, instance.matrix_world)):
+        for numbers, mask in self._variants(ob, slots, lambda: self._pane(mesh, instance.matrix_world)):
             self._add_variant(instance, ob, mesh, slots, numbers, mask)
 
     def _add_hair(self, instance, ob, override):
@@ -584,33 +592,19 @@ class Collector:
             self.scene.objects.append(Owner(ob.name, top.name, ob.pass_index))
         mesh.owners += [self._owners[ob.name]] * count
 
-    def _is_pane(self, mesh, matrix):
-        """Whether a mesh is open (has edges of a single face), or flat: at most a tenth as thick as wide."""
+    def _pane(self, mesh, matrix):
+        """Flags of glass on a mesh that is a pane: open (has edges of a single face), or flat (at most a tenth as thick as
+        wide). An open one of a single layer is the surface of a body that it does not close; 0 where it is none."""
         key = mesh.as_pointer()
         if key not in self._sheets:
             faces = np.bincount(fetch(mesh.loops, "edge_index", len(mesh.loops), 1, np.int32).ravel())
             places = vertex_positions(mesh)
-            self._sheets[key] = bool((faces == 1).any()), np.ptp(places, axis=0) if len(places) else np.zeros(3)
-        is_open, extents = self._sheets[key]
+            self._sheets[key] = bool((faces == 1).any()), is_one_layer(mesh), np.ptp(places, axis=0) if len(places) else np.zeros(3)
+        is_open, one_layer, extents = self._sheets[key]
+        if is_open:
+            return library.SHADOWS_PASS | (library.OPEN_GLASS if one_layer else 0)
         thickness, width, _ = sorted(extents * np.abs(matrix.to_scale()))
-        return is_open or thickness <= 0.1 * width
-
-    def _is_noted_pane(self, ob, mesh, matrix):
-        """The same, with a note where Cycles shows what lies behind a sheet darker."""
-        pane = self._is_pane(mesh, matrix)
-        if self._sheets[mesh.as_pointer()][0] and self._shows_its_back(mesh, matrix):
-            self.report.note(ob.name, "Sheets of glass whose back the camera sees: Cycles takes that side for the inside of the glass, and what shines through is half as bright there; turn the normals or give the sheet a thickness")
-        return pane
-
-    def _shows_its_back(self, mesh, matrix):
-        camera = self.depsgraph.scene.camera
-        if camera is None or not mesh.polygons:
-            return False
-        count = len(mesh.polygons)
-        normals = fetch(mesh.polygons, "normal", count, 3, np.float32) * fetch(mesh.polygons, "area", count, 1, np.float32).reshape(-1, 1)
-        normal = matrix.to_3x3().inverted_safe().transposed() @ mathutils.Vector(normals.sum(axis=0))
-        centre = matrix @ mathutils.Vector(vertex_positions(mesh).mean(axis=0))
-        return normal.dot(camera.evaluated_get(self.depsgraph).matrix_world.translation - centre) < 0
+        return library.SHADOWS_PASS if thickness <= 0.1 * width else 0
 
     def _hidden_from(self, ob):
         """Kinds of rays that do not see an object: its own setting, and its collection's Indirect Only."""

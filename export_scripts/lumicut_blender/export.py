@@ -223,6 +223,8 @@ class Writer:
                 out["burley"] = True
             if m.flags & library.SHADOWS_PASS:
                 out["shadows_pass"] = True
+            if m.flags & library.OPEN_GLASS:
+                out["open_glass"] = True
             if any(m.specular_tint):
                 out["specular_tint"] = numbers(m.specular_tint)
             if any(m.absorption):

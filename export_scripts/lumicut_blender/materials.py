@@ -598,12 +598,12 @@ class Materials:
         """Index of the same material as a hole to the camera."""
         return self._flagged(number, "holdout", library.HOLDOUT)
 
-    def _flagged(self, number, name, flag):
-        """Index of the same material with one flag more."""
+    def _flagged(self, number, name, flags):
+        """Index of the same material with more flags."""
         if (number, name) not in self._numbers:
             base = self.converted[number]
             values = type(base.values).from_buffer_copy(base.values)
-            values.flags |= flag
+            values.flags |= flags
             self._numbers[number, name] = self._add(dataclasses.replace(base, name=f"{base.name} ({name})", values=values))
         return self._numbers[number, name]
 
@@ -611,10 +611,10 @@ class Materials:
         self.converted.append(converted)
         return len(self.converted) - 1
 
-    def numbers(self, material, pane=lambda: False):
+    def numbers(self, material, pane=lambda: 0):
         """Index of a Blender material (None: the default grey) for each kind of ray, in the order of library.RAYS; kinds
-        that see it alike have one. `pane`: whether the mesh is a sheet or flat, asked of glass alone. Light goes straight
-        through panes; bodies bend it."""
+        that see it alike have one. `pane`: flags of glass on this mesh, asked of glass alone: light goes straight through
+        panes; bodies bend it."""
         key = None if material is None else material.name_full
         if key not in self._numbers:
             self._numbers[key] = self._number_by_ray(material)
@@ -636,8 +636,8 @@ class Materials:
         values = self.converted[number].values
         if values.transmission <= 0 or values.flags & library.SHADOWS_PASS:
             return number
-        if pane():
-            return self._flagged(number, "pane", library.SHADOWS_PASS)
+        if flags := pane():
+            return self._flagged(number, "sheet" if flags & library.OPEN_GLASS else "pane", flags)
         self.report.note(self.converted[number].name, "Glass bodies: lamps do not shine straight through them, their light passes along light paths alone")
         return number
 

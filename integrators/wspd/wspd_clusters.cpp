@@ -187,7 +187,7 @@ void WspdTree::find_cubemaps(const Options& options, Progress& progress) {
           const float t = -b + std::sqrt(std::max(0.0f, b * b - length2(from) + node.radius * node.radius));
           if (!(t > 0.0f)) continue;
           Ray r;
-          r.org = v.position, r.dir = d, r.tfar = t, r.mask = v.ray_mask;
+          r.org = v.position, r.dir = d, r.tfar = t, r.mask = v.ray_mask, r.flags = kFromLight;
           rays.push_back(r);
           samples.push_back({cell, weight});
         }

@@ -111,6 +111,26 @@ TEST(SpecularLobes, WhiteGlassWhoseShadowsPassKeepsAllLightFromEitherSide) {
     }
 }
 
+// Of even light from all sides what the inside gets is what a border that bends it lets in and throws back: all. A single
+// direction may get more or less.
+TEST(SpecularLobes, OpenGlassKeepsEvenLightAsItsInsideSeesIt) {
+  for (const float ior : {1.33f, 1.5f, 2.0f}) {
+    Material m = window(0);
+    m.ior = ior, m.open_glass = true;
+    const OneSurface surface(m);
+    Rng rng(9, Stage::test);
+    double all = 0;
+    constexpr int kDirections = 2000;
+    for (int i = 0; i < kDirections; ++i) {
+      const Vec3f view = at(-std::sqrt((static_cast<float>(i) + 0.5f) / kDirections));  // by the cosine
+      const Bsdf bsdf = surface.bsdf(view);
+      for (const auto& s : bsdf.specular_ways(0.3f, 0.6f, Passage::straight))
+        if (s) all += s->weight.y / kDirections;
+    }
+    EXPECT_NEAR(all, 1, 0.002) << ior;
+  }
+}
+
 // What all ways carry together is what choosing one of them carries in the mean.
 TEST(SpecularLobes, AllWaysTogetherAreTheMeanOfOneByChance) {
   Material metal = ggx({0.9f, 0.6f, 0.3f}, 0), lacquer = ggx({0.5f, 0.4f, 0.3f}, 0.6f);

@@ -385,6 +385,9 @@ TEST(SceneJson, GgxHasItsOwnParameters) {
       {{"name", "window"}, {"model", "ggx"}, {"transmission", 1}, {"roughness", 0}, {"shadows_pass", true}});
   EXPECT_EQ(read_scene(folder.write("scene.json", scene.dump())).materials.back().values.flags,
             uint32_t{LUMICUT_GGX | LUMICUT_SHADOWS_PASS});
+  scene["materials"].back()["open_glass"] = true;
+  EXPECT_EQ(read_scene(folder.write("scene.json", scene.dump())).materials.back().values.flags,
+            uint32_t{LUMICUT_GGX | LUMICUT_SHADOWS_PASS | LUMICUT_OPEN_GLASS});
   scene["materials"].push_back({{"name", "clay"}, {"oren_nayar", "once"}, {"roughness", 0.25}});
   const lumicut_material clay = read_scene(folder.write("scene.json", scene.dump())).materials.back().values;
   EXPECT_EQ(clay.flags, uint32_t{LUMICUT_OREN_NAYAR | LUMICUT_FACETS_ONCE});
@@ -393,6 +396,9 @@ TEST(SceneJson, GgxHasItsOwnParameters) {
   expect_in(wrong({{"name", "a"}, {"shadows_pass", true}}), {"shadows_pass", "\"ggx\" alone"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"shadows_pass", true}}),
             {"shadows_pass", "needs a \"transmission\" above 0"});
+  expect_in(wrong({{"name", "a"}, {"open_glass", true}}), {"open_glass", "\"ggx\" alone"});
+  expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"transmission", 1}, {"open_glass", true}}),
+            {"open_glass", "needs \"shadows_pass\""});
   expect_in(wrong({{"name", "a"}, {"fresnel", false}}), {"fresnel", "\"ggx\" alone"});
   expect_in(wrong({{"name", "a"}, {"burley", true}}), {"burley", "\"ggx\" alone"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"burley", true}, {"fresnel", false}}),

@@ -176,9 +176,11 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
        "lumicut_material[3].metallic: must be 0 with"},
       {[](M& m) { m.flags = LUMICUT_SHADOWS_PASS; },
        "lumicut_material[3].flags: holds LUMICUT_SHADOWS_PASS without LUMICUT_GGX"},
+      {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_OPEN_GLASS; },
+       "lumicut_material[3].flags: holds LUMICUT_OPEN_GLASS without LUMICUT_SHADOWS_PASS"},
       {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_SHADOWS_PASS, m.transmission = 0; },
        "lumicut_material[3].transmission: must be above 0 with LUMICUT_SHADOWS_PASS"},
-      {[](M& m) { m.flags = 1024; }, "lumicut_material[3].flags: 1024", LUMICUT_UNSUPPORTED},
+      {[](M& m) { m.flags = 2048; }, "lumicut_material[3].flags: 2048", LUMICUT_UNSUPPORTED},
   };
   for (const auto& w : wrongs) {
     auto m = materials();

@@ -103,6 +103,8 @@ std::vector<Change> scene_changes() {
                [](M& m) { m.flags = (m.flags & ~uint32_t{LUMICUT_GGX | LUMICUT_BURLEY}) | LUMICUT_OREN_NAYAR; }),
       material("material.flags (Burley)", [](M& m) { m.flags |= LUMICUT_BURLEY; }),
       material("material.flags (shadows pass)", [](M& m) { m.flags |= LUMICUT_SHADOWS_PASS, m.transmission = 0.5f; }),
+      material("material.flags (open glass)",
+               [](M& m) { m.flags |= LUMICUT_SHADOWS_PASS | LUMICUT_OPEN_GLASS, m.transmission = 0.5f; }),
       material("material.specular_tint",
                [](M& m) { m.specular_tint[0] = m.specular_tint[1] = 1, m.specular_tint[2] = 0.5f; }),
       material("material.flags (holdout)", [](M& m) { m.flags |= LUMICUT_HOLDOUT; }),

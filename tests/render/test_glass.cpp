@@ -22,6 +22,8 @@ enum class Glass {
   straight_rough,
   straight_lamp,
   straight_tinted,
+  open_out,  // and what lies behind them is inside
+  open_in,
 };
 
 void add_ball(Mesh& mesh, const Vec3f& center, float radius, uint32_t material) {
@@ -44,6 +46,7 @@ std::unique_ptr<Scene> make_glass(Glass kind) {
   Material glowing = test::diffuse(0, 0, 0);
   glowing.emission = {2, 2, 2};
   if (kind >= Glass::straight_sheet) glass.shadows_pass = true;
+  if (kind >= Glass::open_out) glass.open_glass = true;
   if (kind == Glass::straight_sheet) glass.diffuse = {0.8f, 0.7f, 0.9f};
   if (kind == Glass::tinted_ball || kind == Glass::straight_tinted) glass.absorption = {1, 4, 2};
   if (kind == Glass::straight_rough) glass.roughness = 0.4f;
@@ -69,9 +72,11 @@ std::unique_ptr<Scene> make_glass(Glass kind) {
     case Glass::straight_sheet:
     case Glass::straight_rough:
     case Glass::straight_lamp:
+    case Glass::open_out:
     case Glass::sheet_out:
       test::add_quad(mesh, {-1, 0, -1}, {1, 0, -1}, {1, 0, 1}, {-1, 0, 1}, 1);
       break;
+    case Glass::open_in:
     case Glass::sheet_in:
       test::add_quad(mesh, {-1, 0, 1}, {1, 0, 1}, {1, 0, -1}, {-1, 0, -1}, 1);
       break;
@@ -114,7 +119,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, OfGlass,
                          testing::Values(Glass::none, Glass::sheet_out, Glass::sheet_in, Glass::slab, Glass::ball,
                                          Glass::paper, Glass::straight_sheet, Glass::straight_slab,
                                          Glass::straight_ball, Glass::straight_rough, Glass::straight_lamp,
-                                         Glass::tinted_ball, Glass::straight_tinted));
+                                         Glass::tinted_ball, Glass::straight_tinted, Glass::open_out, Glass::open_in));
 
 TEST_P(OfGlass, CompensatedIterationsGiveThePathTracersImage) {
   const auto scene = make_glass(GetParam());

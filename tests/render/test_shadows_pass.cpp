@@ -34,7 +34,7 @@ Camera looking_down(float height, float tan_half_fov_y) {
   return camera;
 }
 
-enum class Body { sheet, slab };
+enum class Body { sheet, turned_sheet, slab };
 
 // A wide floor under wide glass, and a camera beneath it that sees a small place at the origin.
 std::unique_ptr<Scene> floor_under(Body body, const Material& glass, const Light& light) {
@@ -44,6 +44,8 @@ std::unique_ptr<Scene> floor_under(Body body, const Material& glass, const Light
   test::add_quad(floor, {-40, -40, 0}, {40, -40, 0}, {40, 40, 0}, {-40, 40, 0}, 0);
   if (body == Body::sheet)
     test::add_quad(window, {-40, -40, 2}, {40, -40, 2}, {40, 40, 2}, {-40, 40, 2}, 1);
+  else if (body == Body::turned_sheet)
+    test::add_quad(window, {-40, 40, 2}, {40, 40, 2}, {40, -40, 2}, {-40, -40, 2}, 1);
   else
     test::add_box(window, {-40, -40, 2}, {40, 40, 2.1f}, 1, false);
   scene->add_mesh(std::move(floor)), scene->add_mesh(std::move(window));
@@ -113,6 +115,24 @@ TEST_P(ThroughGlass, APointLightToo) {
   const auto scene = floor_under(Body::sheet, pane(), lamp);
   EXPECT_NEAR(render(*scene).y / (20 * cosine / 25 * passed * kAlbedo / std::numbers::pi), 1,
               tolerance(passed) + 0.003);
+}
+
+// The camera looks down at the floor: with the normal upwards both are inside the glass.
+TEST_P(ThroughGlass, OpenGlassPassesLessByTheSquareOfItsIndexToWhatIsInsideIt) {
+  Material open = pane();
+  open.open_glass = true;
+  Light lamp;
+  lamp.type = LightType::point, lamp.position = {3, 0, 4}, lamp.value = {20, 20, 20};
+  const double of_lamp = 20 * 0.8 / 25 * passed_by_fresnel(0.8), of_sun = 3 * 0.7 * passed_by_fresnel(0.7);
+  for (const Body body : {Body::sheet, Body::turned_sheet})
+    for (const bool is_sun : {false, true}) {
+      const double passed = passed_by_fresnel(is_sun ? 0.7 : 0.8) / (body == Body::sheet ? 2.25 : 1);
+      const double expected =
+          (is_sun ? of_sun : of_lamp) / (body == Body::sheet ? 2.25 : 1) * kAlbedo / std::numbers::pi;
+      const auto scene = floor_under(body, open, is_sun ? sun(0.7) : lamp);
+      // Glass throws more of the floor's light back inwards: 60 % of 0.01.
+      EXPECT_NEAR(render(*scene).y / expected, 1, tolerance(passed) + 0.006) << static_cast<int>(body) << is_sun;
+    }
 }
 
 TEST_P(ThroughGlass, ColourDimsByItsLuminance) {

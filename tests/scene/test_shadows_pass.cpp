@@ -176,6 +176,36 @@ TEST_P(ShadowsPass, TheSameRaysWithEveryBackend) {
   }
 }
 
+// What lies behind an open surface lies inside the glass, where light of the other side comes in a narrower cone.
+TEST_P(ShadowsPass, ThroughOpenGlassLessByTheSquareOfTheIndexForWhatIsBehindIt) {
+  const auto [backend, place] = GetParam();
+  Material open = pane();
+  open.open_glass = true;
+  const Square square(backend, place, open);
+  const Vec3f normal = normalize(square.to_world.normal({0, 0, 1}));
+  constexpr float kCosine = 0.5f;
+  constexpr size_t kRays = test::trimmed(20000);
+  const double whole = passed_by_fresnel(kCosine, 1.5), noise = 4 * std::sqrt(0.25 / kRays);
+  for (const bool lit_behind : {false, true}) {
+    const double expected = lit_behind ? whole / (1.5 * 1.5) : whole;
+    Rng rng(7, Stage::test);
+    std::vector<Ray> from_lights, to_lights;
+    while (from_lights.size() < kRays) {
+      Ray r = square.ray(kCosine, rng);
+      if ((dot(r.dir, normal) < 0) != lit_behind) continue;
+      r.flags = kFromLight;
+      from_lights.push_back(r);
+      r.org = r.org + r.dir * r.tfar, r.dir = -r.dir, r.flags = 0;
+      to_lights.push_back(r);
+    }
+    EXPECT_NEAR(share_passed(stopped(square.scene, from_lights)), expected, noise);
+    EXPECT_NEAR(share_passed(stopped(square.scene, to_lights)), expected, noise);
+    from_lights.resize(kRays / 10), to_lights.resize(kRays / 10);
+    EXPECT_NEAR(share_passed(stopped_in_bundles(square.scene, from_lights, false)), expected, 3.2 * noise);
+    EXPECT_NEAR(share_passed(stopped_in_bundles(square.scene, to_lights, true)), expected, 3.2 * noise);
+  }
+}
+
 TEST(ShadowsPass, DimmedByColourOpacityAndTheShareOfGlass) {
   constexpr size_t kRays = test::trimmed(40000);
   const auto passed = [&](const Material& m) {

@@ -161,6 +161,9 @@ enum {
                                  than it seems, as Cycles has it */
   LUMICUT_OREN_NAYAR = 256,  /* not with LUMICUT_GGX: the diffuse part is Oren and Nayar's (Fujii's form), facets of the slope `roughness` */
   LUMICUT_FACETS_ONCE = 512, /* with that: what the facets reflect more than once is lost (Blender before 4.3) */
+  LUMICUT_OPEN_GLASS = 1024, /* with LUMICUT_SHADOWS_PASS: the surface has no second border, so that what lies behind it lies inside
+                                the glass. What goes straight on to there is divided by the square of ior, and what is reflected
+                                there is what glass reflects from inside */
   LUMICUT_HOLDOUT = 64 /* camera rays that meet it show black, and count in no channel: alpha is 0 there. Other rays see it */
 };
 
