@@ -55,13 +55,16 @@ Bsdf::Bsdf(const BsdfParameters& parameters, const SurfaceView& view)
   specular_color_ = colors_.specular;
   specular_ = smooth_coat(parameters.coat, parameters.coat_alpha) || colors_.is_specular();
   const float cosine = set_mirror(to_viewer_, p);
-  const GgxDiffuse diffuse = ggx_diffuse(colors_, parameters.additive, cosine);
+  const GgxDiffuse diffuse = ggx_diffuse(colors_, parameters, cosine);
   p.diffuse = diffuse.scale * kInvPi;
   p.falloff = diffuse.falloff;
   p.retro = 2.0f * std::sqrt(colors_.alpha) * diffuse.burley, p.dim = 0.5f * diffuse.burley;
   p.lobe = kLobe<GgxReflection>, p.shape = std::max(kLeastAlpha, colors_.alpha);
   p.ior = colors_.ior;
-  if (colors_.alpha >= kLeastAlpha) p.specular = colors_.specular, p.grazing = colors_.grazing;
+  if (colors_.alpha >= kLeastAlpha) {
+    p.specular = colors_.specular, p.grazing = colors_.grazing;
+    if (parameters.bright_lobe) brighten_lobe(colors_, cosine, p.specular, p.grazing);
+  }
   if (parameters.coat > 0.0f) {
     const ClearCoat coat = clear_coat(parameters, cosine);
     if (!parameters.additive) dim_by_coat(coat, p);

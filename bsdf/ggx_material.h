@@ -18,6 +18,7 @@ struct GgxColors {
   Rgb specular;                // F0 of metal and dielectric together
   Rgb grazing;                 // F90 of both
   float alpha, ior;            // of the lobe
+  bool bare;                   // without Fresnel
 
   // Whether rays follow its lobe, without regard to a clear coat.
   bool is_specular() const { return alpha < kLeastAlpha || clear > 0.0f; }
@@ -52,7 +53,7 @@ inline GgxColors ggx_colors(const BsdfParameters& m) {
   c.opaque = (1.0f - c.metal) * (1.0f - m.transmission);
   c.alpha = m.alpha;
   if (!m.fresnel) {
-    c.metal = c.clear = 0.0f, c.opaque = 1.0f;
+    c.metal = c.clear = 0.0f, c.opaque = 1.0f, c.bare = true;
     c.specular = c.grazing = m.specular, c.ior = kMetalIndex;
     return c;
   }
@@ -73,24 +74,37 @@ struct GgxDiffuse {
   float burley;   // share that is Burley's
 };
 
+inline Rgb mean_reflectance(const Rgb& f0, const Rgb& f90) { return f0 + (f90 - f0) * kMeanShare; }
+
+// Adds to a lobe, seen at `cosine`, what facets of rough metal reflect again of what single reflection loses, as if all of it
+// kept to the lobe's directions: bright_lobe. [Kulla, Conty 2017; Turquin 2019]
+inline void brighten_lobe(const GgxColors& c, float cosine, Rgb& specular, Rgb& grazing) {
+  const float lost = facet_loss(c.alpha, cosine), mean_lost = mean_facet_loss(c.alpha);
+  const Rgb mean = c.bare ? c.specular : mean_reflectance(c.base, c.metal_edge);
+  const Rgb f0 = c.bare ? c.specular : c.base * c.metal, f90 = c.bare ? c.specular : c.metal_edge * c.metal;
+  for (int k = 0; k < 3; ++k) {
+    const float again = mean[k] * (1.0f - mean_lost) / (1.0f - mean[k] * mean_lost) * lost / (1.0f - lost);
+    specular[k] += f0[k] * again, grazing[k] += f90[k] * again;
+  }
+}
+
 // For a surface seen at `cosine`. The view has what the coat leaves, and what single reflection at rough metal loses, as
 // they are; the light has falloffs that are near to that, with the same mean. [Kulla, Conty 2017]
-inline GgxDiffuse ggx_diffuse(const GgxColors& c, bool additive, float cosine) {
+inline GgxDiffuse ggx_diffuse(const GgxColors& c, const BsdfParameters& m, float cosine) {
   const float f0 = max_component(c.f0);
   const LobeTransmittance rest =
-      additive ? LobeTransmittance{1.0f, 0.0f} : lobe_transmittance(f0, c.f90, c.ior, c.alpha, cosine);
+      m.additive ? LobeTransmittance{1.0f, 0.0f} : lobe_transmittance(f0, c.f90, c.ior, c.alpha, cosine);
   const Rgb coat = c.base * (c.opaque * rest.to_viewer / mean_diffuse_falloff(rest.falloff));
-  if (!(c.metal > 0.0f)) return {coat, rest.falloff, additive ? 1.0f : 0.0f};
+  if (!(c.metal > 0.0f) || m.facets_once || m.bright_lobe) return {coat, rest.falloff, m.additive ? 1.0f : 0.0f};
   const float mean_lost = mean_facet_loss(c.alpha), lost = facet_loss(c.alpha, cosine);
+  const Rgb mean = mean_reflectance(c.base, c.metal_edge);
   Rgb metal{};
-  for (int k = 0; k < 3; ++k) {
-    const float mean = c.base[k] + (c.metal_edge[k] - c.base[k]) * kMeanShare;
-    metal[k] =
-        c.metal * mean * mean * (1.0f - mean_lost) / (1.0f - mean * mean_lost) * lost / mean_diffuse_falloff(1.0f);
-  }
+  for (int k = 0; k < 3; ++k)
+    metal[k] = c.metal * mean[k] * mean[k] * (1.0f - mean_lost) / (1.0f - mean[k] * mean_lost) * lost /
+               mean_diffuse_falloff(1.0f);
   const float whole = luminance(coat) + luminance(metal);
   const float falloff = whole > 0.0f ? (luminance(coat) * rest.falloff + luminance(metal)) / whole : rest.falloff;
-  return {coat + metal, falloff, additive && whole > 0.0f ? luminance(coat) / whole : 0.0f};
+  return {coat + metal, falloff, m.additive && whole > 0.0f ? luminance(coat) / whole : 0.0f};
 }
 
 }  // namespace lumicut

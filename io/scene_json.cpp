@@ -293,6 +293,7 @@ class SceneReader {
       // Of another meaning there: a multiple of the reflectance that the index of refraction gives.
       if ((m.flags & ~before & LUMICUT_GGX) != 0 && !object.has("specular"))
         for (float& c : m.specular) c = 1.0f;
+      if (((m.flags ^ before) & LUMICUT_GGX) != 0) m.flags &= ~uint32_t{LUMICUT_FACETS_ONCE};  // of another meaning too
     }
     const bool ggx = (m.flags & LUMICUT_GGX) != 0;
     const auto number = [&](const char* key, float& out, double low, double high, bool of_model) {
@@ -336,7 +337,16 @@ class SceneReader {
       constexpr uint32_t kOnce = LUMICUT_OREN_NAYAR | LUMICUT_FACETS_ONCE, kFlags[] = {0, kOnce, LUMICUT_OREN_NAYAR};
       m.flags = (m.flags & ~kOnce) | kFlags[oren_nayar->choice({"none", "once", "often"})];
     }
-    if (ggx) m.flags &= ~uint32_t{LUMICUT_OREN_NAYAR | LUMICUT_FACETS_ONCE};
+    if (auto again = object.find("multiple_scattering")) {
+      if (!ggx) again->fail("is of the model \"ggx\" alone");
+      constexpr uint32_t kFlags[] = {0, LUMICUT_BRIGHT_LOBE, LUMICUT_FACETS_ONCE};
+      m.flags = (m.flags & ~(kFlags[1] | kFlags[2])) | kFlags[again->choice({"even", "lobe", "none"})];
+    }
+    if (ggx)
+      m.flags &= ~uint32_t{LUMICUT_OREN_NAYAR};
+    else
+      m.flags &= ~uint32_t{LUMICUT_BRIGHT_LOBE};
+    if ((m.flags & (LUMICUT_GGX | LUMICUT_OREN_NAYAR)) == 0) m.flags &= ~uint32_t{LUMICUT_FACETS_ONCE};
     number("shininess", m.shininess, 0, 1e6, !ggx);
     number("roughness", m.roughness, 0, 1, ggx || (m.flags & LUMICUT_OREN_NAYAR) != 0);
     number("metallic", m.metallic, 0, 1, ggx);

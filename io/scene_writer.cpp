@@ -299,6 +299,8 @@ class Writer {
       out["oren_nayar"] = (m.flags & LUMICUT_FACETS_ONCE) != 0 ? "once" : "often";
       out["roughness"] = m.roughness;
     }
+    if (ggx && (m.flags & (LUMICUT_BRIGHT_LOBE | LUMICUT_FACETS_ONCE)) != 0)
+      out["multiple_scattering"] = (m.flags & LUMICUT_BRIGHT_LOBE) != 0 ? "lobe" : "none";
     flag(LUMICUT_SHADOWS_PASS, "shadows_pass", true);
     flag(LUMICUT_OPEN_GLASS, "open_glass", true);
     flag(LUMICUT_EMIT_BOTH_SIDES, "emit_both_sides", true);

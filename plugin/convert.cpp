@@ -94,7 +94,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   c.flags("flags", in.flags,
           LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG | LUMICUT_GGX | LUMICUT_NO_FRESNEL | LUMICUT_BURLEY |
               LUMICUT_SHADOWS_PASS | LUMICUT_HOLDOUT | LUMICUT_BUMP_SHADOWS | LUMICUT_OREN_NAYAR | LUMICUT_FACETS_ONCE |
-              LUMICUT_OPEN_GLASS);
+              LUMICUT_OPEN_GLASS | LUMICUT_BRIGHT_LOBE);
   if ((in.flags & LUMICUT_PHONG) != 0 && (in.flags & LUMICUT_GGX) != 0)
     c.fail("flags", "holds both LUMICUT_PHONG and LUMICUT_GGX");
   if ((in.flags & LUMICUT_NO_FRESNEL) != 0) {
@@ -108,8 +108,13 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   }
   if ((in.flags & LUMICUT_OREN_NAYAR) != 0 && (in.flags & LUMICUT_GGX) != 0)
     c.fail("flags", "holds both LUMICUT_OREN_NAYAR and LUMICUT_GGX");
-  if ((in.flags & LUMICUT_FACETS_ONCE) != 0 && (in.flags & LUMICUT_OREN_NAYAR) == 0)
-    c.fail("flags", "holds LUMICUT_FACETS_ONCE without LUMICUT_OREN_NAYAR");
+  if ((in.flags & LUMICUT_FACETS_ONCE) != 0 && (in.flags & (LUMICUT_OREN_NAYAR | LUMICUT_GGX)) == 0)
+    c.fail("flags", "holds LUMICUT_FACETS_ONCE without LUMICUT_OREN_NAYAR or LUMICUT_GGX");
+  if ((in.flags & LUMICUT_BRIGHT_LOBE) != 0) {
+    if ((in.flags & LUMICUT_GGX) == 0) c.fail("flags", "holds LUMICUT_BRIGHT_LOBE without LUMICUT_GGX");
+    if ((in.flags & LUMICUT_FACETS_ONCE) != 0)
+      c.fail("flags", "holds both LUMICUT_BRIGHT_LOBE and LUMICUT_FACETS_ONCE");
+  }
   if ((in.flags & LUMICUT_OPEN_GLASS) != 0 && (in.flags & LUMICUT_SHADOWS_PASS) == 0)
     c.fail("flags", "holds LUMICUT_OPEN_GLASS without LUMICUT_SHADOWS_PASS");
   if ((in.flags & LUMICUT_SHADOWS_PASS) != 0) {
@@ -138,7 +143,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   if ((in.flags & LUMICUT_PHONG) != 0) m.lobe = LobeModel::phong;
   if ((in.flags & LUMICUT_GGX) != 0) m.lobe = LobeModel::ggx;
   m.fresnel = (in.flags & LUMICUT_NO_FRESNEL) == 0;
-  m.burley = (in.flags & LUMICUT_BURLEY) != 0;
+  m.burley = (in.flags & LUMICUT_BURLEY) != 0, m.bright_lobe = (in.flags & LUMICUT_BRIGHT_LOBE) != 0;
   m.oren_nayar = (in.flags & LUMICUT_OREN_NAYAR) != 0, m.facets_once = (in.flags & LUMICUT_FACETS_ONCE) != 0;
   m.shadows_pass = (in.flags & LUMICUT_SHADOWS_PASS) != 0, m.open_glass = (in.flags & LUMICUT_OPEN_GLASS) != 0;
   m.holdout = (in.flags & LUMICUT_HOLDOUT) != 0;

@@ -17,10 +17,12 @@ struct Material {
   Rgb translucency{};  // share of the light that leaves on the other side, evenly
   float shininess = 0.0f;
   LobeModel lobe = LobeModel::blinn;
-  bool oren_nayar = false, facets_once = false;  // not of GGX: bsdf/oren_nayar.h, of the slope `roughness`
+  bool oren_nayar = false;   // not of GGX: bsdf/oren_nayar.h, of the slope `roughness`
+  bool facets_once = false;  // of that, and of GGX: what facets reflect more than once is lost
   // GGX alone: `diffuse` is the base colour, `specular` multiplies the dielectric's reflectance at normal incidence.
   // Without `fresnel` it is the lobe's own reflectance at every angle, beside Lambert's `diffuse`: no metal, no glass.
   bool fresnel = true;
+  bool bright_lobe = false;    // that makes the lobe brighter, instead of leaving evenly
   bool burley = false;         // the diffuse part; and the lobes above take nothing from it
   Rgb specular_tint{1, 1, 1};  // of metal at 82 degrees, and of what glass reflects
   float roughness = 0.5f, metallic = 0.0f, ior = 1.5f, transmission = 0.0f;
@@ -40,11 +42,12 @@ struct Material {
   int32_t roughness_texture = -1, metallic_texture = -1;  // GGX alone; green and blue, as glTF packs them
   int32_t diffuse_texture = -1, specular_texture = -1, opacity_texture = -1, emission_texture = -1;
   int32_t translucency_texture = -1;
-  LUMICUT_FIELDS(Material, diffuse, specular, translucency, shininess, lobe, oren_nayar, facets_once, fresnel, burley,
-                 specular_tint, roughness, metallic, ior, transmission, coat, coat_roughness, coat_ior, shadows_pass,
-                 open_glass, absorption, bump_shadows, holdout, opacity, emission, emit_both_sides, normal_strength,
-                 normal_texture, bump_strength, bump_distance, height_texture, roughness_texture, metallic_texture,
-                 diffuse_texture, specular_texture, opacity_texture, emission_texture, translucency_texture)
+  LUMICUT_FIELDS(Material, diffuse, specular, translucency, shininess, lobe, oren_nayar, facets_once, fresnel,
+                 bright_lobe, burley, specular_tint, roughness, metallic, ior, transmission, coat, coat_roughness,
+                 coat_ior, shadows_pass, open_glass, absorption, bump_shadows, holdout, opacity, emission,
+                 emit_both_sides, normal_strength, normal_texture, bump_strength, bump_distance, height_texture,
+                 roughness_texture, metallic_texture, diffuse_texture, specular_texture, opacity_texture,
+                 emission_texture, translucency_texture)
 
   // Whether light that goes straight through its glass is absorbed there.
   bool absorbs_straight() const { return shadows_pass && max_component(absorption) > 0.0f; }

@@ -591,9 +591,10 @@ BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv, const Surface
   p.diffuse = texel(m.diffuse, m.diffuse_texture), p.specular = texel(m.specular, m.specular_texture);
   p.translucency = texel(m.translucency, m.translucency_texture);
   p.exponent = m.shininess;
-  if (m.oren_nayar) p.slope = m.roughness, p.facets_once = m.facets_once;
+  if (m.oren_nayar) p.slope = m.roughness;
+  p.facets_once = m.facets_once;
   if (m.lobe != LobeModel::ggx) return p;
-  p.fresnel = m.fresnel, p.additive = m.burley, p.specular_tint = m.specular_tint;
+  p.fresnel = m.fresnel, p.bright_lobe = m.bright_lobe, p.additive = m.burley, p.specular_tint = m.specular_tint;
   float roughness = m.roughness;
   if (m.roughness_texture >= 0) roughness *= share(color(m.roughness_texture).y);
   p.alpha = roughness * roughness;

@@ -221,6 +221,8 @@ class Writer:
                 out["fresnel"] = False
             if m.flags & library.BURLEY:
                 out["burley"] = True
+            if m.flags & (library.BRIGHT_LOBE | library.FACETS_ONCE):
+                out["multiple_scattering"] = "lobe" if m.flags & library.BRIGHT_LOBE else "none"
             if m.flags & library.SHADOWS_PASS:
                 out["shadows_pass"] = True
             if m.flags & library.OPEN_GLASS:

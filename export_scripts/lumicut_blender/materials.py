@@ -45,19 +45,6 @@ LOSSES = (0, 0.006, 0.0318, 0.0842, 0.1532, 0.2269, 0.3, 0.3697, 0.4341, 0.4925,
 LOSSES_APART = (0, 0.006, 0.032, 0.087, 0.157, 0.233, 0.309, 0.385, 0.456, 0.524, 0.584, 0.638)
 
 
-MEAN_SHARE = 0.054  # of the way from F0 to 1, over even light: kMeanShare in bsdf/ggx_material.h
-
-
-def single_scattering(colour, alpha):
-    """Colour of a metal that with the library's multiple scattering reflects, of even light, what `colour` reflects
-    without: with F the mean of Fresnel's curve, F (1 − L)/(1 − F L) instead of F (1 − L)."""
-    lost = np.interp(alpha, ALPHAS, LOSSES)
-    wanted = np.interp(alpha, ALPHAS, LOSSES_APART if bpy.app.version < (4, 0, 0) else LOSSES)
-    left = (np.asarray(colour) * (1 - MEAN_SHARE) + MEAN_SHARE) * (1 - wanted)
-    mean = left / (1 - lost + left * lost)
-    return np.maximum(0, (mean - MEAN_SHARE) / (1 - MEAN_SHARE))
-
-
 # Share of light that single scattering leaves of what passes a glass ball of index 1.5, by roughness in steps of 0.1:
 # rendered by Cycles 3.4 under an even sky, 7 % taken off as reflected.
 THROUGH = (1, 0.995, 0.977, 0.933, 0.854, 0.758, 0.635, 0.499, 0.373, 0.265, 0.176)
@@ -67,6 +54,16 @@ def single_scattering_glass(roughness, ior):
     """Factor of what passes two borders; the exponent fits a ball of index 1.2 to 0.03."""
     index = max(ior, 1 / max(ior, 0.1))
     return float(np.interp(roughness, np.linspace(0, 1, 11), THROUGH)) ** ((index - 1) / 0.5)
+
+
+def scatters_again(node):
+    """Whether what metal's facets lose in one reflection is reflected again, to other facets."""
+    return getattr(node, "distribution", "MULTI_GGX") == "MULTI_GGX"
+
+
+def facets(node):
+    """How: since 4.0 that makes the lobe brighter."""
+    return library.FACETS_ONCE if not scatters_again(node) else library.BRIGHT_LOBE if bpy.app.version >= (4, 0, 0) else 0
 
 
 @dataclasses.dataclass
@@ -107,6 +104,7 @@ class Surface:
     by_place: ByPlace = None
     clearcoat: ClearCoat = None
     slope: float = 0.0    # of the diffuse part's facets (Oren-Nayar)
+    facets: int = 0       # flags of what metal's facets reflect again
     burley: bool = False  # the diffuse part, of which coats take nothing
     tint: tuple = None    # of metal's edge, of what glass reflects
     absorption: tuple = None  # inside glass, 1/length
@@ -227,7 +225,7 @@ class SurfaceReader(Evaluator):
                   for slot in (*REFLECTED, "emission", "opacity")}
         return Surface(roughness=roughness, ior=a.ior if luminance(a.glass) > luminance(b.glass) else b.ior,
                        rough_picture=picture, by_place=by_place, clearcoat=clearcoat, slope=slope, burley=a.burley if da >= db else b.burley,
-                       tint=a.tint if wa >= wb else b.tint, shadows_pass=a.shadows_pass or b.shadows_pass,
+                       tint=a.tint if wa >= wb else b.tint, facets=a.facets if wa >= wb else b.facets, shadows_pass=a.shadows_pass or b.shadows_pass,
                        holdout=(f.scalar() if a.holdout else 0) + (g.scalar() if b.holdout else 0) >= 0.5, **summed)
 
     def closure_mix_shader(self, node, stack):
@@ -343,23 +341,23 @@ class SurfaceReader(Evaluator):
         return Surface(diffuse=self.value(node.inputs["Color"], stack), slope=slope)
 
     def metal(self, node, colour, gloss):
-        """The colour; darker where the node lets rough metal lose light. A picture of roughness counts by its mean."""
+        """The colour of metal; where Cycles' facets lose more than the library's, darker by that: a picture of roughness
+        counts by its mean."""
         alpha = gloss["roughness"] ** 2
-        if getattr(node, "distribution", "MULTI_GGX") == "MULTI_GGX" or alpha < 0.02 or colour.is_zero():
+        if scatters_again(node) or bpy.app.version >= (4, 0, 0) or alpha < 0.02 or colour.is_zero():
             return colour
-        self.note(node.bl_label, "Rough metal of single scattering darkened by its mean albedo")
-        return self.apply("single scattering", lambda c: single_scattering(c, alpha), colour)
+        return self.multiply(colour, Value((1 - np.interp(alpha, ALPHAS, LOSSES_APART)) / (1 - np.interp(alpha, ALPHAS, LOSSES))))
 
     def closure_bsdf_glossy(self, node, stack):
         self.bumps(node, stack)
         gloss = self.gloss(node, stack)
         colour = self.value(node.inputs["Color"], stack)
         again = ZERO
-        if getattr(node, "distribution", "") == "MULTI_GGX":
+        if getattr(node, "distribution", "") == "MULTI_GGX" and bpy.app.version < (4, 0, 0):
             # What single scattering loses and the facets reflect again, evenly: c (1 − L) · c L/(1 − c L).
             lost = float(np.interp(gloss["roughness"] ** 2, ALPHAS, LOSSES))
             again = self.apply("scattered again", lambda c: c * c * lost * (1 - lost) / (1 - c * lost), colour)
-        return Surface(gloss=colour, diffuse=again, **gloss)
+        return Surface(gloss=colour, diffuse=again, facets=facets(node), **gloss)
 
     closure_bsdf_anisotropic = closure_bsdf_glossy
 
@@ -369,7 +367,7 @@ class SurfaceReader(Evaluator):
         gloss = self.rough(node, stack)
         edge = node.inputs.get("Edge Tint")
         tint = None if edge is None else tuple(self.value(edge, stack).mean())
-        return Surface(metal=self.metal(node, self.value(input_of(node, "Base Color", "Color"), stack), gloss), tint=tint, **gloss)
+        return Surface(metal=self.metal(node, self.value(input_of(node, "Base Color", "Color"), stack), gloss), tint=tint, facets=facets(node), **gloss)
 
     def closure_emission(self, node, stack):
         colour, strength = self.value(node.inputs["Color"], stack), self.value(node.inputs["Strength"], stack)
@@ -548,7 +546,7 @@ class SurfaceReader(Evaluator):
                 f0, metal, glass = self.multiply(f0, rest), self.multiply(metal, rest), self.multiply(glass, rest)
         return Surface(diffuse=diffuse, metal=self.multiply(metal, metallic), glass=glass,
                        coat=self.multiply(f0, opaque), ior=ior, emission=emission, opacity=opacity, by_place=by_place,
-                       clearcoat=clearcoat, burley=bpy.app.version < (4, 0, 0), tint=tint, **gloss)
+                       clearcoat=clearcoat, burley=bpy.app.version < (4, 0, 0), tint=tint, facets=facets(node), **gloss)
 
 
 @dataclasses.dataclass
@@ -752,7 +750,7 @@ class Materials:
             return {"diffuse": diffuse, "specular": ZERO}
         if surface.slope > 0 and d > 0:
             self.report.note(name, "Rough diffuse (Oren-Nayar) mixed with gloss, taken as Lambert")
-        m.flags |= library.GGX
+        m.flags |= library.GGX | surface.facets
         if surface.burley and luminance(surface.gloss) <= 0:
             m.flags |= library.BURLEY
         if surface.tint is not None:

@@ -24,8 +24,9 @@ inline SurfacePoint random_surface(Rng& rng, float half, bool glossy) {
         Rgb{rng.next_float(), rng.next_float(), rng.next_float()} * cosine_lobe_scale(rng.next_below(2) == 0, p.shape);
     if (rng.next_below(2) == 0) {
       p.lobe = kLobe<GgxReflection>, p.shape = std::pow(0.01f, rng.next_float());
-      p.specular = {rng.next_float(), rng.next_float(), rng.next_float()};
-      p.grazing = {rng.next_float(), rng.next_float(), rng.next_float()}, p.falloff = rng.next_float();
+      const float bright = rng.next_below(3) == 0 ? 1.0f + rng.next_float() : 1.0f;  // of what facets reflect again
+      p.specular = Rgb{rng.next_float(), rng.next_float(), rng.next_float()} * bright;
+      p.grazing = Rgb{rng.next_float(), rng.next_float(), rng.next_float()} * bright, p.falloff = rng.next_float();
       p.ior = rng.next_below(8) == 0 ? 0.5f + 0.5f * rng.next_float() : 1.0f + 4.0f * rng.next_float();
     }
     if (rng.next_below(3) == 0) {

@@ -392,6 +392,15 @@ TEST(SceneJson, GgxHasItsOwnParameters) {
   const lumicut_material clay = read_scene(folder.write("scene.json", scene.dump())).materials.back().values;
   EXPECT_EQ(clay.flags, uint32_t{LUMICUT_OREN_NAYAR | LUMICUT_FACETS_ONCE});
   EXPECT_EQ(clay.roughness, 0.25f);
+  for (const auto& [word, flag] :
+       {std::pair{"even", 0u}, {"lobe", uint32_t{LUMICUT_BRIGHT_LOBE}}, {"none", uint32_t{LUMICUT_FACETS_ONCE}}}) {
+    scene["materials"].push_back({{"name", word}, {"model", "ggx"}, {"multiple_scattering", word}});
+    EXPECT_EQ(read_scene(folder.write("scene.json", scene.dump())).materials.back().values.flags,
+              uint32_t{LUMICUT_GGX} | flag);
+  }
+  expect_in(wrong({{"name", "a"}, {"multiple_scattering", "lobe"}}), {"multiple_scattering", "\"ggx\" alone"});
+  expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"multiple_scattering", "lobes"}}),
+            {"multiple_scattering", "lobes"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"oren_nayar", "often"}}), {"oren_nayar", "not of the model"});
   expect_in(wrong({{"name", "a"}, {"shadows_pass", true}}), {"shadows_pass", "\"ggx\" alone"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"shadows_pass", true}}),

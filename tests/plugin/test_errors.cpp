@@ -167,7 +167,11 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
       {[](M& m) { m.flags = LUMICUT_OREN_NAYAR | LUMICUT_GGX; },
        "lumicut_material[3].flags: holds both LUMICUT_OREN_NAYAR and LUMICUT_GGX"},
       {[](M& m) { m.flags = LUMICUT_FACETS_ONCE; },
-       "lumicut_material[3].flags: holds LUMICUT_FACETS_ONCE without LUMICUT_OREN_NAYAR"},
+       "lumicut_material[3].flags: holds LUMICUT_FACETS_ONCE without LUMICUT_OREN_NAYAR or LUMICUT_GGX"},
+      {[](M& m) { m.flags = LUMICUT_BRIGHT_LOBE; },
+       "lumicut_material[3].flags: holds LUMICUT_BRIGHT_LOBE without LUMICUT_GGX"},
+      {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_BRIGHT_LOBE | LUMICUT_FACETS_ONCE; },
+       "lumicut_material[3].flags: holds both LUMICUT_BRIGHT_LOBE and LUMICUT_FACETS_ONCE"},
       {[](M& m) { m.flags = LUMICUT_BURLEY; }, "lumicut_material[3].flags: holds LUMICUT_BURLEY without LUMICUT_GGX"},
       {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_BURLEY | LUMICUT_NO_FRESNEL; },
        "lumicut_material[3].flags: holds both LUMICUT_BURLEY and LUMICUT_NO_FRESNEL"},
@@ -180,7 +184,7 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
        "lumicut_material[3].flags: holds LUMICUT_OPEN_GLASS without LUMICUT_SHADOWS_PASS"},
       {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_SHADOWS_PASS, m.transmission = 0; },
        "lumicut_material[3].transmission: must be above 0 with LUMICUT_SHADOWS_PASS"},
-      {[](M& m) { m.flags = 2048; }, "lumicut_material[3].flags: 2048", LUMICUT_UNSUPPORTED},
+      {[](M& m) { m.flags = 4096; }, "lumicut_material[3].flags: 4096", LUMICUT_UNSUPPORTED},
   };
   for (const auto& w : wrongs) {
     auto m = materials();

@@ -102,6 +102,8 @@ std::vector<Change> scene_changes() {
       material("material.flags (Oren and Nayar)",
                [](M& m) { m.flags = (m.flags & ~uint32_t{LUMICUT_GGX | LUMICUT_BURLEY}) | LUMICUT_OREN_NAYAR; }),
       material("material.flags (Burley)", [](M& m) { m.flags |= LUMICUT_BURLEY; }),
+      material("material.flags (bright lobe)", [](M& m) { m.flags |= LUMICUT_BRIGHT_LOBE; }),
+      material("material.flags (single scattering)", [](M& m) { m.flags |= LUMICUT_FACETS_ONCE; }),
       material("material.flags (shadows pass)", [](M& m) { m.flags |= LUMICUT_SHADOWS_PASS, m.transmission = 0.5f; }),
       material("material.flags (open glass)",
                [](M& m) { m.flags |= LUMICUT_SHADOWS_PASS | LUMICUT_OPEN_GLASS, m.transmission = 0.5f; }),

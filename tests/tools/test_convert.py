@@ -54,7 +54,7 @@ def json_scene(path):
                                                                              "shininess": 33.3, "diffuse": [0.2, 0.1, 0.7]},
                       {"name": "glass", "model": "ggx", "transmission": 1, "shadows_pass": True, "open_glass": True, "ior": 1.45, "absorption": [0.1, 0.2, 0.3],
                        "specular_tint": [1, 0.9, 0.8]},
-                      {"name": "cloth", "model": "ggx", "burley": True, "translucency": [0.1, 0.2, 0.1], "coat": 0.5, "coat_roughness": 0.2}],
+                      {"name": "cloth", "model": "ggx", "burley": True, "multiple_scattering": "lobe", "translucency": [0.1, 0.2, 0.1], "coat": 0.5, "coat_roughness": 0.2}],
         "meshes": [{"positions": square, "quads": [[0, 1, 2, 3]], "material": "a", "transform": {"scale": 3}, "shadow_catcher": True,
                     "attributes": [{"name": "colour", "domain": "vertices", "components": 3, "values": [1, .5, .2, .3, 1, 1, .2, .2, 1, 1, 1, 1]}]},
                    {"positions": square, "quads": [[0, 1, 2, 3]], "material": "a 2", "hidden_from": ["camera", "glossy"], "group": 3,

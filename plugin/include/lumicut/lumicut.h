@@ -160,7 +160,10 @@ enum {
   LUMICUT_BUMP_SHADOWS = 128, /* bent normals, of normal and height textures: the diffuse part is dimmed where light comes flatter
                                  than it seems, as Cycles has it */
   LUMICUT_OREN_NAYAR = 256,  /* not with LUMICUT_GGX: the diffuse part is Oren and Nayar's (Fujii's form), facets of the slope `roughness` */
-  LUMICUT_FACETS_ONCE = 512, /* with that: what the facets reflect more than once is lost (Blender before 4.3) */
+  LUMICUT_FACETS_ONCE = 512, /* with that (Blender before 4.3), or with LUMICUT_GGX (of single scattering): what facets reflect more
+                                than once is lost. Of rough metal it leaves evenly otherwise */
+  LUMICUT_BRIGHT_LOBE = 2048, /* with LUMICUT_GGX: of rough metal, and of lobes without Fresnel, it makes the lobe brighter instead, as
+                                 in Blender since 4.0; eye and light paths differ a little then, as no reciprocal lobe does that */
   LUMICUT_OPEN_GLASS = 1024, /* with LUMICUT_SHADOWS_PASS: the surface has no second border, so that what lies behind it lies inside
                                 the glass. What goes straight on to there is divided by the square of ior, and what is reflected
                                 there is what glass reflects from inside */
