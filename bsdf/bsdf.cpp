@@ -171,7 +171,8 @@ std::optional<BsdfSample> Bsdf::specular_way(std::optional<Way> way, float choic
   if (c.clear > 0.0f) {
     const float border = fresnel_reflectance(cosine, ratio, refracted);
     const bool rough = !(alpha < kSmoothAlpha) && parameters_.glass != nullptr;
-    const float clear = c.clear / (rough ? parameters_.glass->at(inside, alpha, view.z) : 1.0f);
+    const float kept = rough && !parameters_.facets_once ? parameters_.glass->at(inside, alpha, view.z) : 1.0f;
+    const float clear = c.clear / kept;
     reflected += parameters_.specular_tint * (clear * border);
     // The base colour is that of two borders, as a closed body has them.
     for (int k = 0; k < 3; ++k) passed[k] = clear * (1.0f - border) * std::sqrt(std::max(0.0f, c.base[k]));

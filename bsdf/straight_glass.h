@@ -25,6 +25,7 @@ inline Rgb straight_transmittance(const BsdfParameters& m, float cosine, bool fr
   float refracted = 0.0f;
   float share =
       clear * (rough ? m.glass->passed(m.alpha, cosine) : 1.0f - fresnel_reflectance(cosine, m.ior, refracted));
+  if (rough && m.facets_once) share *= m.glass->at(false, m.alpha, cosine);
   if (m.coat > 0.0f && !m.additive) share *= clear_coat(m, cosine).transmittance.to_viewer;
   if (m.open_glass && from_inside) share = std::min(1.0f, share / (m.ior * m.ior));
   Rgb passed{};

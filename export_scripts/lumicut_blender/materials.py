@@ -38,22 +38,9 @@ def ior_of(reflectance):
     return (1 + root) / (1 - root)
 
 
-# Mean share of even light that single reflection at GGX facets loses, by α: twin of mean_facet_loss in
-# bsdf/facet_albedo.h; and about what balls of metal lose in Cycles 3.4, which masks view and light each by itself.
+# Mean share of even light that single reflection at GGX facets loses, by α: twin of mean_facet_loss in bsdf/facet_albedo.h.
 ALPHAS = (0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1)
 LOSSES = (0, 0.006, 0.0318, 0.0842, 0.1532, 0.2269, 0.3, 0.3697, 0.4341, 0.4925, 0.5449, 0.5913)
-LOSSES_APART = (0, 0.006, 0.032, 0.087, 0.157, 0.233, 0.309, 0.385, 0.456, 0.524, 0.584, 0.638)
-
-
-# Share of light that single scattering leaves of what passes a glass ball of index 1.5, by roughness in steps of 0.1:
-# rendered by Cycles 3.4 under an even sky, 7 % taken off as reflected.
-THROUGH = (1, 0.995, 0.977, 0.933, 0.854, 0.758, 0.635, 0.499, 0.373, 0.265, 0.176)
-
-
-def single_scattering_glass(roughness, ior):
-    """Factor of what passes two borders; the exponent fits a ball of index 1.2 to 0.03."""
-    index = max(ior, 1 / max(ior, 0.1))
-    return float(np.interp(roughness, np.linspace(0, 1, 11), THROUGH)) ** ((index - 1) / 0.5)
 
 
 def scatters_again(node):
@@ -340,14 +327,6 @@ class SurfaceReader(Evaluator):
         slope = min(1.0, max(0.0, self.number(node.inputs["Roughness"], stack, "roughness")))
         return Surface(diffuse=self.value(node.inputs["Color"], stack), slope=slope)
 
-    def metal(self, node, colour, gloss):
-        """The colour of metal; where Cycles' facets lose more than the library's, darker by that: a picture of roughness
-        counts by its mean."""
-        alpha = gloss["roughness"] ** 2
-        if scatters_again(node) or bpy.app.version >= (4, 0, 0) or alpha < 0.02 or colour.is_zero():
-            return colour
-        return self.multiply(colour, Value((1 - np.interp(alpha, ALPHAS, LOSSES_APART)) / (1 - np.interp(alpha, ALPHAS, LOSSES))))
-
     def closure_bsdf_glossy(self, node, stack):
         self.bumps(node, stack)
         gloss = self.gloss(node, stack)
@@ -367,7 +346,7 @@ class SurfaceReader(Evaluator):
         gloss = self.rough(node, stack)
         edge = node.inputs.get("Edge Tint")
         tint = None if edge is None else tuple(self.value(edge, stack).mean())
-        return Surface(metal=self.metal(node, self.value(input_of(node, "Base Color", "Color"), stack), gloss), tint=tint, facets=facets(node), **gloss)
+        return Surface(metal=self.value(input_of(node, "Base Color", "Color"), stack), tint=tint, facets=facets(node), **gloss)
 
     def closure_emission(self, node, stack):
         colour, strength = self.value(node.inputs["Color"], stack), self.value(node.inputs["Strength"], stack)
@@ -388,19 +367,11 @@ class SurfaceReader(Evaluator):
             self.by_ray = True  # others see a black surface
         return Surface(holdout=self.ray == "camera")
 
-    def loss(self, node, gloss, ior):
-        """Factor of what passes glass; darker where the node lets rough glass lose light."""
-        if getattr(node, "distribution", "") not in {"GGX", "BECKMANN"} or gloss["roughness"] < 0.15:
-            return ONE
-        self.note(node.bl_label, "Rough glass of single scattering darkened by its mean albedo")
-        return Value(single_scattering_glass(gloss["roughness"], ior))
-
     def closure_bsdf_glass(self, node, stack):
         self.bumps(node, stack)
         colour = self.value(node.inputs["Color"], stack)
         ior, gloss = self.number(node.inputs["IOR"], stack, "IOR"), self.gloss(node, stack)
-        through = self.multiply(self.multiply(colour, colour), self.loss(node, gloss, ior))
-        return Surface(glass=through, ior=ior, tint=tuple(colour.mean()), **gloss)
+        return Surface(glass=self.multiply(colour, colour), ior=ior, tint=tuple(colour.mean()), facets=facets(node), **gloss)
 
     def closure_bsdf_refraction(self, node, stack):
         self.note(node.bl_label, "Shaders taken as glass, which reflects too")
@@ -526,10 +497,8 @@ class SurfaceReader(Evaluator):
         # Before 4.0 each border coloured by the base, since then by its root. A diffuse share needs the base itself.
         pure = transmission.picture is None and (transmission.factor >= 0.99).all()
         through = self.multiply(base, base) if pure and bpy.app.version < (4, 0, 0) else base
-        if not transmission.is_zero():
-            through = self.multiply(through, self.loss(node, gloss, ior))
         glass = self.multiply(self.multiply(through, dielectric), transmission)
-        metal = base if metallic.is_zero() else self.metal(node, base, gloss)
+        metal = base
         rough_glass = node.inputs.get("Transmission Roughness")
         if rough_glass is not None and not transmission.is_zero() and not self.value(rough_glass, stack).is_zero():
             self.note("transmission roughness", "Principled features left out")
@@ -537,7 +506,7 @@ class SurfaceReader(Evaluator):
         opacity = value("Alpha")
         by_place = None
         if metallic.picture is not None:
-            by_place = ByPlace(metallic, base if metal is base else self.mix(metallic, base, metal), f0)
+            by_place = ByPlace(metallic, base, f0)
         diffuse = self.multiply(base, opaque)
         if sheen is not None:
             diffuse = self.add(self.multiply(diffuse, left), sheen if left is not ONE else self.multiply(sheen, opaque))

@@ -8,7 +8,7 @@ WRONG, APPROXIMATED, NUANCE = range(3)  # severities, worst first
 _WRONG = re.compile(r"left out|not there|without data|without an image|without the|constant|taken as black|cannot|"
                     r"in place of|nothing within|should see|cast them here|light all here|all see here|ordinary objects|perspective ones|is rendered alone")
 # What only a measurement tells.
-_NUANCES = re.compile(r"of the same median width|of single scattering darkened|coats?, taken as|cut to that|rendered by Cycles into an image|"
+_NUANCES = re.compile(r"of the same median width|coats?, taken as|cut to that|rendered by Cycles into an image|"
                       r"read with a remark|moved to the origin|Diffuse parts of two models|Colours above 1|shapes? of the aperture|"
                       r"Bump Map Correction", re.I)
 

@@ -84,7 +84,7 @@ def cases():
     yield "diffuse", h.diffuse((0.5, 0.5, 0.5)), False, 0.01
     for roughness in (0.2, 0.5, 0.9):
         yield f"metal {roughness}", principled("Metal", **{"Base Color": GOLD, "Metallic": 1.0, "Roughness": roughness})[0], False, 0.035
-    yield "metal 0.9, single scattering", principled("Metal", False, **{"Base Color": GOLD, "Metallic": 1.0, "Roughness": 0.9})[0], False, 0.05
+    yield "metal 0.9, single scattering", principled("Metal", False, **{"Base Color": GOLD, "Metallic": 1.0, "Roughness": 0.9})[0], False, 0.03
     yield "mirror", principled("Mirror", **{"Base Color": GOLD, "Metallic": 1.0, "Roughness": 0.0})[0], False, 0.02
     for roughness in (0.2, 0.5, 0.9):
         yield f"coated diffuse {roughness}", principled("Plastic", **{"Base Color": RED, "Roughness": roughness})[0], False, 0.03
@@ -98,7 +98,7 @@ def cases():
     yield "rough glass 0.2", glass("Frosted", 0.2), False, 0.035
     yield "rough glass 0.5", glass("Frosted", 0.5), False, 0.075
     yield "rough glass 0.9", glass("Frosted", 0.9), False, 0.33
-    yield "rough glass 0.5, single scattering", glass("Frosted", 0.5, multi=False), False, 0.15
+    yield "rough glass 0.5, single scattering", glass("Frosted", 0.5, multi=False), False, 0.1
     yield "coloured glass", glass("Bottle", 0.0, (0.5, 0.8, 0.6)), False, 0.025
     yield "principled glass", principled("Flask", **{"Base Color": (0.5, 0.8, 0.6), TRANSMISSION: 1.0, "Roughness": 0.0, "IOR": 1.5})[0], False, 0.02
     m, node = principled("Mapped", **{"Base Color": (0.5, 0.5, 0.5), "Roughness": 0.4, "Metallic": 1.0})

@@ -131,6 +131,19 @@ TEST(SpecularLobes, OpenGlassKeepsEvenLightAsItsInsideSeesIt) {
   }
 }
 
+TEST(SpecularLobes, RoughGlassOfSingleScatteringLosesWhatMeetsOtherFacets) {
+  const GlassAlbedo kept(1.5f);
+  for (const float roughness : {0.4f, 0.7f, 1.0f})
+    for (const float cosine : {1.0f, 0.6f, 0.3f, -0.6f, -1.0f}) {
+      Material m = glass(roughness, 1.5f);
+      m.facets_once = true;
+      const auto [reflected, transmitted] = energy(m, at(cosine));
+      const double expected = kept.at(cosine < 0, roughness * roughness, std::abs(cosine));
+      EXPECT_LT(expected, 1) << roughness << " " << cosine;
+      EXPECT_NEAR(reflected + transmitted, expected, 0.02) << roughness << " " << cosine;  // of the table, and noise
+    }
+}
+
 // What all ways carry together is what choosing one of them carries in the mean.
 TEST(SpecularLobes, AllWaysTogetherAreTheMeanOfOneByChance) {
   Material metal = ggx({0.9f, 0.6f, 0.3f}, 0), lacquer = ggx({0.5f, 0.4f, 0.3f}, 0.6f);
