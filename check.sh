@@ -6,7 +6,7 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 build() {
-  cmake --preset "$1"
+  cmake --preset "$1" -DCMAKE_COMPILE_WARNING_AS_ERROR=ON  # not for users: other compilers warn of other things
   cmake --build --preset "$1"
 }
 step() { printf '\n== %s (%d s)\n' "$1" "$SECONDS"; }
