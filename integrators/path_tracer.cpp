@@ -177,15 +177,18 @@ class PathTracer final : public Integrator {
   // What the path's ray found: adds what it emits; true where the path goes on from there.
   bool arrive(Path& path, const RayHit& hit, std::span<Rgb> radiance) const {
     Rgb& sum = radiance[path.index];
-    if (!light_surfaces_->empty())
-      light_surfaces_->for_each_hit(hit.ray.org, path.direction, hit.ray.tfar, [&](const LightSurfaces::Hit& seen) {
-        const LightReach& reach = scene_->lights()[seen.light].reach;
-        const bool shown = reach.lights(path.kind) && in_set(path.point.not_lit_by, reach.receivers);
-        if (path.specular ? !shown : !seen.by_rays) return;
-        const double distance = double{path.travelled} + seen.t;
-        const double density = sampler_->light_density(seen.light) * distance * distance / seen.cosine;
-        sum += path.weight * seen.radiance * (path.specular ? 1.0f : power_heuristic(path.pdf, density));
-      });
+    const auto shine = [&](const LightSurfaces::Hit& seen) {
+      const LightReach& reach = scene_->lights()[seen.light].reach;
+      const bool shown = reach.lights(path.kind) && in_set(path.point.not_lit_by, reach.receivers);
+      if (path.specular ? !shown : !seen.by_rays) return;
+      const double distance = double{path.travelled} + seen.t;
+      const double density = sampler_->light_density(seen.light) * distance * distance / seen.cosine;
+      sum += path.weight * seen.radiance * (path.specular ? 1.0f : power_heuristic(path.pdf, density));
+    };
+    if (path.specular)
+      light_surfaces_->for_each_hit(hit.ray.org, path.direction, hit.ray.tfar, shine);
+    else
+      light_surfaces_->for_each_panel(hit.ray.org, path.direction, hit.ray.tfar, shine);
     if (hit.hit.geom == kNoId) {
       const LightReach& reach = scene_->environment().reach;
       if (path.specular ? !reach.lights(path.kind) : reach.limited()) return false;

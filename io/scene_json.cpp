@@ -296,10 +296,11 @@ class SceneReader {
       if (((m.flags ^ before) & LUMICUT_GGX) != 0) m.flags &= ~uint32_t{LUMICUT_FACETS_ONCE};  // of another meaning too
     }
     const bool ggx = (m.flags & LUMICUT_GGX) != 0;
-    const auto number = [&](const char* key, float& out, double low, double high, bool of_model) {
+    const auto number = [&](const char* key, float& out, double low, double high, bool of_model,
+                            const char* models = "the model \"ggx\"") {
       const auto value = object.find(key);
       if (!value) return;
-      if (!of_model) value->fail(ggx ? "is not of the model \"ggx\"" : "is of the model \"ggx\" alone");
+      if (!of_model) value->fail(ggx ? "is not of the model \"ggx\"" : fmt::format("is of {} alone", models));
       out = static_cast<float>(value->number(low, high));
     };
     const auto set_flag = [&](uint32_t flag, bool on) { m.flags = on ? m.flags | flag : m.flags & ~flag; };
@@ -348,7 +349,8 @@ class SceneReader {
       m.flags &= ~uint32_t{LUMICUT_BRIGHT_LOBE};
     if ((m.flags & (LUMICUT_GGX | LUMICUT_OREN_NAYAR)) == 0) m.flags &= ~uint32_t{LUMICUT_FACETS_ONCE};
     number("shininess", m.shininess, 0, 1e6, !ggx);
-    number("roughness", m.roughness, 0, 1, ggx || (m.flags & LUMICUT_OREN_NAYAR) != 0);
+    number("roughness", m.roughness, 0, 1, ggx || (m.flags & LUMICUT_OREN_NAYAR) != 0,
+           "the model \"ggx\" and of \"oren_nayar\" surfaces");
     number("metallic", m.metallic, 0, 1, ggx);
     number("transmission", m.transmission, 0, 1, ggx);
     if ((m.flags & LUMICUT_NO_FRESNEL) != 0)

@@ -8,8 +8,17 @@
 
 namespace lumicut {
 
+namespace {
+// By what rounding may take from it.
+void widen(Aabb& box) {
+  for (int k = 0; k < 3; ++k) {
+    const float slack = 1e-6f * std::max(std::abs(box.lo[k]), std::abs(box.hi[k]));
+    box.lo[k] -= slack, box.hi[k] += slack;
+  }
+}
+}  // namespace
+
 LightSurfaces::LightSurfaces(const Scene& scene, RaysOf rays) : scene_(scene), of_paths_(rays == RaysOf::paths) {
-  bool disks = false;
   for (uint32_t i = 0; i < scene.lights().size(); ++i) {
     const Light& l = scene.lights()[i];
     const bool seen = l.reach.lights(kCameraRay);
@@ -20,49 +29,55 @@ LightSurfaces::LightSurfaces(const Scene& scene, RaysOf rays) : scene_(scene), o
         lamps_.push_back(i);
       if (shown && l.type == LightType::sun) suns_.push_back(i);
     }
-    if (!has(l) || !(max_component(l.value) > 0.0f) || !(area(l) > 0.0f)) continue;
-    const auto base = static_cast<uint32_t>(positions_.size());
-    lights_.push_back(i);
-    disks = disks || l.type == LightType::disk;
-    for (const auto& [a, b] : {Vec2f{-0.5f, -0.5f}, Vec2f{0.5f, -0.5f}, Vec2f{0.5f, 0.5f}, Vec2f{-0.5f, 0.5f}})
-      positions_.push_back(l.position + l.u * a + l.v * b);
-    indices_.insert(indices_.end(), {base, base + 1, base + 2, base, base + 2, base + 3});
+    if (has(l) && max_component(l.value) > 0.0f && area(l) > 0.0f) panels_.push_back(i);
   }
-  if (lights_.empty()) return;
-  AccelGeometry geometry;
-  geometry.filter = this;
-  geometry.meshes.push_back(
-      {positions_.data(), positions_.size(), indices_.data(), indices_.size() / 3, 0xffffffffu, disks});
-  accel_ = make_accel(kDefaultAccel, geometry, {true, ""});
+  panel_boxes_ = LightBoxes(boxes_of_panels()), lamp_boxes_ = LightBoxes(boxes_of_lamps());
+}
+
+std::vector<Aabb> LightSurfaces::boxes_of_panels() const {
+  std::vector<Aabb> boxes;
+  for (const uint32_t panel : panels_) {
+    const Light& l = scene_.lights()[panel];
+    Aabb& box = boxes.emplace_back();
+    for (const auto& [a, b] : {Vec2f{-0.5f, -0.5f}, Vec2f{0.5f, -0.5f}, Vec2f{0.5f, 0.5f}, Vec2f{-0.5f, 0.5f}})
+      box.extend(l.position + l.u * a + l.v * b);
+    widen(box);
+  }
+  return boxes;
+}
+
+std::vector<Aabb> LightSurfaces::boxes_of_lamps() const {
+  std::vector<Aabb> boxes;
+  for (const uint32_t lamp : lamps_) {
+    const Light& l = scene_.lights()[lamp];
+    const Vec3f reach{l.radius, l.radius, l.radius};
+    Aabb& box = boxes.emplace_back();
+    box.extend(l.position - reach), box.extend(l.position + reach);
+    widen(box);
+  }
+  return boxes;
 }
 
 float LightSurfaces::area(const Light& light) {
   return length(cross(light.u, light.v)) * (light.type == LightType::disk ? 0.25f * std::numbers::pi_v<float> : 1.0f);
 }
 
-// The corners of a disk's parallelogram let rays through.
-bool LightSurfaces::passes(const CandidateHit& hit) const {
-  if (scene_.lights()[lights_[hit.prim / 2]].type != LightType::disk) return false;
-  // From the corner (-1/2, -1/2) to its two followers.
-  const float across = hit.u + hit.v;
-  const float x = hit.prim % 2 == 0 ? across : hit.u, y = hit.prim % 2 == 0 ? hit.v : across;
-  return (x - 0.5f) * (x - 0.5f) + (y - 0.5f) * (y - 0.5f) > 0.25f;
-}
-
-bool LightSurfaces::next(const Vec3f& origin, const Vec3f& direction, float& near, float far, Hit& hit) const {
-  RayHit ray;
-  ray.ray.org = origin, ray.ray.dir = direction, ray.ray.tnear = near, ray.ray.tfar = far;
-  accel_->intersect({&ray, 1});
-  if (ray.hit.geom == kNoId) return false;
-  hit.light = lights_[ray.hit.prim / 2];
-  hit.t = ray.ray.tfar;
-  near = hit.t * (1.0f + 1e-5f) + 1e-12f;
-  const Light& light = scene_.lights()[hit.light];
-  hit.by_rays = !light.reach.limited();
-  hit.cosine = -dot(normalize(cross(light.u, light.v)), direction);
-  hit.radiance = hit.cosine > 0.0f
-                     ? light_radiance(light, scene_.light_value(light, origin + direction * hit.t), hit.cosine)
-                     : Rgb{};
+bool LightSurfaces::meet_panel(uint32_t panel, const Vec3f& origin, const Vec3f& direction, float far, Hit& hit) const {
+  const Light& l = scene_.lights()[panel];
+  const float width = length(l.u), height = length(l.v);
+  const Vec3f u = l.u * (1.0f / width), v = l.v * (1.0f / height), across = cross(u, v);
+  const float skew = length(across);
+  const Vec3f normal = across * (1.0f / skew);
+  hit.cosine = -dot(normal, direction);
+  if (!(hit.cosine > 0.0f)) return false;
+  const Vec3f from_middle = origin - l.position;
+  hit.t = dot(normal, from_middle) / hit.cosine;
+  if (!(hit.t > 0.0f && hit.t < far)) return false;
+  const Vec3f at = from_middle + direction * hit.t;
+  const float x = dot(cross(at, v), normal) / (skew * width), y = dot(cross(u, at), normal) / (skew * height);
+  if (l.type == LightType::disk ? x * x + y * y > 0.25f : std::max(std::abs(x), std::abs(y)) > 0.5f) return false;
+  hit.light = panel, hit.by_rays = !l.reach.limited();
+  hit.radiance = light_radiance(l, scene_.light_value(l, origin + direction * hit.t), hit.cosine);
   return true;
 }
 

@@ -55,7 +55,7 @@ float ClampCompensation::lost_at(const Search& search, const Vec3f& position, fl
 void ClampCompensation::find_lights(const Search& search, size_t ray, TracedPoints& hits) const {
   const RayHit& r = search.rays[ray];
   const Search::Carried& c = search.carried[ray];
-  light_surfaces_.for_each_hit(r.ray.org, r.ray.dir, r.ray.tfar, [&](const LightSurfaces::Hit& seen) {
+  light_surfaces_.for_each_panel(r.ray.org, r.ray.dir, r.ray.tfar, [&](const LightSurfaces::Hit& seen) {
     if (!seen.by_rays) return;
     const float distance = c.travelled + seen.t;
     const float share = nearby_ != nullptr ? nearby_->light_share(c.from, seen.light, distance, c.pdf)

@@ -418,7 +418,7 @@ TEST(SceneJson, GgxHasItsOwnParameters) {
   expect_in(wrong({{"name", "a"}, {"emission_texture", {{"file", "a.exr"}, {"by_view", true}}}}),
             {"materials[", "emission_texture.by_view", "is for diffuse"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"fresnel", false}, {"metallic", 0.5}}), {"metallic", "must be 0"});
-  expect_in(wrong({{"name", "a"}, {"roughness", 0.5}}), {"roughness", "\"ggx\" alone"});
+  expect_in(wrong({{"name", "a"}, {"roughness", 0.5}}), {"roughness", "\"ggx\" and of \"oren_nayar\" surfaces alone"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"shininess", 5}}), {"shininess", "not of the model \"ggx\""});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"roughness", 1.5}}), {"roughness", "1.5"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"ior", 0}}), {"ior", "0"});
