@@ -15,7 +15,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr int kMaxDepth = 64;
+constexpr size_t kMaxDepth = 64;
 
 std::string shown(const json& value) {
   if (value.is_object()) return value.empty() ? "{}" : "an object";
@@ -46,6 +46,49 @@ std::string range_text(double minimum, double maximum) {
   return fmt::format("a number from {} to {}", minimum, maximum);
 }
 
+// Refuses keys that stand twice, and what would overflow the stack. A pass of its own: the parser with a callback looks at
+// all of an array's elements once for each.
+class Watch final : public nlohmann::json_sax<json> {
+ public:
+  explicit Watch(const std::string& file) : file_(file) {}
+  bool null() override { return enter(); }
+  bool boolean(bool) override { return enter(); }
+  bool number_integer(number_integer_t) override { return enter(); }
+  bool number_unsigned(number_unsigned_t) override { return enter(); }
+  bool number_float(number_float_t, const string_t&) override { return enter(); }
+  bool string(string_t&) override { return enter(); }
+  bool binary(binary_t&) override { return enter(); }
+  bool start_object(size_t) override { return open(); }
+  bool end_object() override { return close(); }
+  bool start_array(size_t) override { return open(); }
+  bool end_array() override { return close(); }
+  bool key(string_t& name) override {
+    enter();
+    if (!keys_.back().insert(name).second)
+      throw FileError(file_, fmt::format("the key {} stands twice in one object", shown(json(name))));
+    return true;
+  }
+  // The parser tells it.
+  bool parse_error(size_t, const std::string&, const nlohmann::detail::exception&) override { return false; }
+
+ private:
+  bool enter() const {
+    if (keys_.size() > kMaxDepth) throw FileError(file_, fmt::format("is nested deeper than {} levels", kMaxDepth));
+    return true;
+  }
+  bool open() {
+    enter();
+    keys_.emplace_back();
+    return true;
+  }
+  bool close() {
+    keys_.pop_back();
+    return true;
+  }
+  const std::string& file_;
+  std::vector<std::set<std::string>> keys_;  // of the objects that are open; of arrays none
+};
+
 }  // namespace
 
 std::string nearest_word(const std::string& word, const std::vector<std::string>& known) {
@@ -61,15 +104,6 @@ std::string nearest_word(const std::string& word, const std::vector<std::string>
 
 template <typename Json>
 Json parse_json(const std::string& text, const std::string& file) {
-  std::vector<std::set<std::string>> keys;
-  const auto watch = [&](int depth, typename Json::parse_event_t event, Json& parsed) {
-    if (depth > kMaxDepth) throw FileError(file, fmt::format("is nested deeper than {} levels", kMaxDepth));
-    if (event == Json::parse_event_t::object_start) keys.emplace_back();
-    if (event == Json::parse_event_t::object_end) keys.pop_back();
-    if (event == Json::parse_event_t::key && !keys.back().insert(parsed.template get<std::string>()).second)
-      throw FileError(file, fmt::format("the key {} stands twice in one object", shown(json(parsed))));
-    return true;
-  };
   const auto place = [&](size_t end) {
     const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(end), '\n');
     const size_t line_start = end == 0 ? std::string::npos : text.rfind('\n', end - 1);
@@ -79,7 +113,9 @@ Json parse_json(const std::string& text, const std::string& file) {
   if (const size_t zero = text.find('\0'); zero != std::string::npos)  // the parser would end there
     throw FileError(file, fmt::format("{}: not JSON: a zero byte", place(zero)));
   try {
-    return Json::parse(text, watch);
+    Watch watch(file);
+    json::sax_parse(text, &watch);
+    return Json::parse(text);
   } catch (const json::parse_error& error) {
     const size_t end = std::min(text.size(), error.byte > 0 ? error.byte - 1 : 0);
     std::string what = error.what();
