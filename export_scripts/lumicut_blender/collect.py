@@ -327,8 +327,8 @@ class Collector:
         self.check()
         self.scene.meshes = [mesh for mesh in self._meshes.values() if mesh is not None and mesh.transforms] + self._flat
         self.scene.meshes += [mesh for made in self._shapes.values() for mesh in made if mesh.transforms]
-        if self.profiles.falloffs:
-            self.scene.lights = lights.with_falloffs(self.scene.lights, self.profiles, self.scene.meshes, self.report, self.check)
+        if self.profiles.later:
+            self.scene.lights = lights.settled(self.scene.lights, self.profiles, self.scene.meshes, self.check)
         scene = self.depsgraph.scene_eval
         bake = (lambda world: self.bake(world, scene.frame_current, self.check)) if self.bake is not None else None
         world = (getattr(layer, "world_override", None) or scene.world) if layer.use_sky else None
