@@ -386,7 +386,8 @@ class Collector:
     def _variants(self, ob, slots, pane):
         """(materials by slot, mask): one for each set of materials that some kinds of rays see alike."""
         held_out = ob.is_holdout or ob.holdout_get(view_layer=self.depsgraph.view_layer_eval)  # its own, or its collection's
-        of_slots = [self.materials.numbers(material, pane) for material in slots]
+        bare = ob.type == "MESH" and not len(ob.data.uv_layers)
+        of_slots = [self.materials.numbers(material, pane, bare) for material in slots]
         if ob.as_pointer() not in self._looked_at:
             self._looked_at.add(ob.as_pointer())
             self._check_flags(ob)

@@ -15,7 +15,7 @@ from .lumicut import library
 from .images import Images, Picture, image_of
 from .mappings import Mapping, aligned
 from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Value, fresnel, input_of
-from .programs import NORMAL, CannotCompile, Compiler, ProgramPicture, of_picture, program_of, bump_of
+from .programs import NORMAL, CannotCompile, Compiler, ProgramPicture, bump_of, const, mapped_normal, of_picture, program_of
 
 HOLE = 1e-3  # an opacity that the library takes as "not there"; 0 means 1 to it
 LARGEST_FACTOR = 1e6  # of a texture, in the library
@@ -306,7 +306,8 @@ class SurfaceReader(Evaluator):
             colour = self.value(source.inputs["Color"], stack)
             strength = self.number(source.inputs["Strength"], stack, "normal strength")
             if colour.picture is not None and not colour.picture.is_by_view() and (colour.factor == 1).all() and \
-                    not isinstance(colour.picture, ProgramPicture) and not source.inputs["Strength"].is_linked:
+                    not isinstance(colour.picture, ProgramPicture) and not source.inputs["Strength"].is_linked and \
+                    colour.picture.mapping.is_upright() and colour.picture.mapping.uv_map == source.uv_map:
                 if strength > 0 and self.normals is None:
                     self.normals = colour.picture, min(10.0, strength)
                 elif strength > 0 and self.normals[0].key != colour.picture.key:
@@ -611,14 +612,28 @@ class Materials:
         self.converted.append(converted)
         return len(self.converted) - 1
 
-    def numbers(self, material, pane=lambda: False):
+    def numbers(self, material, pane=lambda: False, bare=False):
         """Index of a Blender material (None: the default grey) for each kind of ray, in the order of library.RAYS; kinds
         that see it alike have one. `pane`: whether the mesh is a sheet or flat, asked of glass alone. Light goes straight
-        through panes; bodies bend it."""
+        through panes; bodies bend it. `bare`: the mesh has no UV map."""
         key = None if material is None else material.name_full
         if key not in self._numbers:
             self._numbers[key] = self._number_by_ray(material)
-        return tuple(self._on_mesh(number, pane) for number in self._numbers[key])
+        return tuple(self._on_mesh(self._without_uvs(number) if bare else number, pane) for number in self._numbers[key])
+
+    def _without_uvs(self, number):
+        """Index of the same material, whose normal map is one colour then, and whose tangents a program must have."""
+        base = self.converted[number]
+        picture = base.pictures.get("normal")
+        if picture is None or isinstance(picture, ProgramPicture):
+            return number
+        if (number, "bare") not in self._numbers:
+            bent = mapped_normal(of_picture(picture), const(base.values.normal_strength), "")
+            pictures = {slot: p for slot, p in base.pictures.items() if slot != "height"} | {"normal": ProgramPicture(base.name, bent)}
+            values = type(base.values).from_buffer_copy(base.values)
+            values.normal_texture, values.normal_strength, values.height_texture = self.picture_number(pictures["normal"]), 1.0, 0
+            self._numbers[number, "bare"] = self._add(dataclasses.replace(base, pictures=pictures, values=values))
+        return self._numbers[number, "bare"]
 
     def _number_by_ray(self, material):
         first = self._convert(material, "camera")
@@ -709,7 +724,7 @@ class Materials:
         every = [slot for slot in (*SLOTS, "roughness", "metallic", "normal", "height")
                  if slot in pictures and not pictures[slot].is_by_view() and not isinstance(pictures[slot], ProgramPicture)]
         together = aligned([pictures[slot] for slot in every], lambda p: self.report.note(f"{name} ({p})", COARSE))
-        if together is None:
+        if together is None or "normal" in every and not together[0].mapping.is_upright():  # which tangents follow
             # Each looked up by a program of its own, but for those of the first mapping; normals and heights stay.
             first = next((pictures[slot] for slot in ("normal", "height") if slot in every), pictures[every[0]])
             apart = [slot for slot in every if pictures[slot].mapping != first.mapping]
