@@ -336,7 +336,27 @@ class SurfaceReader(Evaluator):
         return {"roughness": value.scalar(), "rough_picture": value if value.picture is not None else None}
 
     def gloss(self, node, stack):
-        return {"roughness": 0.0} if getattr(node, "distribution", "") == "SHARP" else self.rough(node, stack)
+        return {"roughness": 0.0} if getattr(node, "distribution", "") == "SHARP" else self.even(node, stack, self.rough(node, stack))
+
+    def even(self, node, stack, gloss):
+        """The same roughness, where it is one across another, as one: the lobe's mean width."""
+        socket = input_of(node, "Anisotropy", "Anisotropic")
+        strength = 0.0 if socket is None else self.number(socket, stack, "anisotropy")
+        if abs(strength) < 1e-3:
+            return gloss
+        self.note(node.bl_label, "Anisotropic gloss, taken as even and as wide in the mean")
+        if socket.name == "Anisotropic":  # a Principled BSDF's
+            stretch = math.sqrt(1 - 0.9 * min(1.0, max(0.0, strength)))
+        else:
+            stretch = 1 - min(0.99, abs(strength))
+
+        def widened(r):
+            wide, narrow = np.minimum(1, r * r / stretch), r * r * stretch
+            return np.sqrt((wide + narrow) / 2)
+
+        picture = gloss["rough_picture"]
+        picture = None if picture is None else self.apply("anisotropy", widened, picture)
+        return {"roughness": float(widened(gloss["roughness"])), "rough_picture": picture}
 
     def closure_bsdf_diffuse(self, node, stack):
         self.bumps(node, stack)
@@ -490,12 +510,9 @@ class SurfaceReader(Evaluator):
             socket = input_of(node, *names)
             return self.value(socket, stack) if socket is not None else ZERO
 
-        for names, text in ((("Anisotropic",), "anisotropy"), (("Thin Film Thickness",), "thin film")):
-            socket = input_of(node, *names)
-            if socket is None:
-                continue
-            if not self.value(socket, stack).is_zero():
-                self.note(text, "Principled features left out")
+        film = input_of(node, "Thin Film Thickness")
+        if film is not None and not self.value(film, stack).is_zero():
+            self.note("thin film", "Principled features left out")
         base = value("Base Color")
         scattered = value("Subsurface", "Subsurface Weight")
         if not scattered.is_zero():
@@ -522,7 +539,7 @@ class SurfaceReader(Evaluator):
             tint = None
         dielectric = self.complement(metallic)
         opaque = self.multiply(dielectric, self.complement(transmission))
-        gloss = self.rough(node, stack)
+        gloss = self.even(node, stack, self.rough(node, stack))
         clearcoat, beneath = self.clear_coat(node, stack)
         sheen, left = self.sheen(node, stack, base)
         base, f0 = self.multiply(beneath, base), self.multiply(beneath, f0)
