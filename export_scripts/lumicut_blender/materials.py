@@ -157,6 +157,10 @@ def luminance(value):
     return value.scalar()
 
 
+def same_hue(a, b):
+    return abs(a.mean() / max(luminance(a), 1e-9) - b.mean() / max(luminance(b), 1e-9)).max() <= 0.05
+
+
 class SurfaceReader(Evaluator):
     """Closures of one material's tree, added up."""
 
@@ -550,6 +554,8 @@ class SurfaceReader(Evaluator):
             through = self.multiply(through, self.loss(node, gloss, ior))
         glass = self.multiply(self.multiply(through, dielectric), transmission)
         metal = base if metallic.is_zero() else self.metal(node, base, gloss)
+        if metallic.picture is None and transmission.is_zero() and not same_hue(base, metal):
+            base = metal = self.mix(metallic, base, metal)  # one colour must do: that of what both reflect
         rough_glass = node.inputs.get("Transmission Roughness")
         if rough_glass is not None and not transmission.is_zero() and not self.value(rough_glass, stack).is_zero():
             self.note("transmission roughness", "Principled features left out")
@@ -810,8 +816,7 @@ class Materials:
             f0, glass = surface.by_place.f0, 0.0
             return {**pictured, "diffuse": surface.by_place.base, "specular": self._specular(f0, glass, name, m)}
         parts = [value for value in (diffuse, surface.metal, surface.glass) if luminance(value) > 0]
-        hues = [value.mean() / luminance(value) for value in parts]
-        if len(parts) > 1 and any(abs(hue - hues[0]).max() > 0.05 for hue in hues):
+        if not all(same_hue(value, parts[0]) for value in parts):
             # One base colour must do.
             if glass >= 0.5 * (d + metal + glass):
                 self.report.note(name, "Glass mixed with shaders of other colours, taken as glass alone")
