@@ -63,6 +63,22 @@ def fit(render, camera_data):
     return horizontal, camera_data.sensor_height if mode == "VERTICAL" else camera_data.sensor_width, width, height
 
 
+LIKE_EQUISOLID = 0.002  # radians from which a lens shows to be another: a pixel where 800 span a right angle
+
+
+def equisolid_like(coefficients, half_fov, radius):
+    """(focal length of the equisolid lens nearest to a polynomial one, by what how many radians they differ at most), out to
+    `radius` on the sensor; None where the polynomial does not open."""
+    r = np.linspace(0, radius, 257)[1:]
+    angle = -np.polynomial.polynomial.polyval(r, coefficients)
+    r, angle = r[(angle > 0) & (angle < half_fov)], angle[(angle > 0) & (angle < half_fov)]
+    if not len(r):
+        return None
+    lenses = r[-1] / (2 * np.sin(np.linspace(0.5, 1.5, 2001) * 0.5 * min(angle[-1], 2.0)))
+    worst = [np.abs(2 * np.arcsin(np.minimum(1, r / (2 * lens))) - angle).max() for lens in lenses]
+    return float(lenses[np.argmin(worst)]), min(worst)
+
+
 def set_panorama(out, camera, aspect, shift_x, report):
     """Makes `out` the panorama of a camera; False where there is none of its kind. `aspect`: of the image."""
     data = camera.data
@@ -72,8 +88,8 @@ def set_panorama(out, camera, aspect, shift_x, report):
         out.panorama = library.EQUIRECTANGULAR
         out.longitude[:] = [own.longitude_min, own.longitude_max]
         out.latitude[:] = [own.latitude_min, own.latitude_max]
-    elif kind in {"FISHEYE_EQUIDISTANT", "FISHEYE_EQUISOLID"}:
-        out.panorama = getattr(library, kind)
+    elif kind in {"FISHEYE_EQUIDISTANT", "FISHEYE_EQUISOLID", "FISHEYE_LENS_POLYNOMIAL"}:
+        out.panorama = getattr(library, kind, library.FISHEYE_EQUISOLID)
         out.fisheye_fov = min(own.fisheye_fov, 2 * math.pi)
         out.fisheye_lens = own.fisheye_lens
         # In millimetres; the side that the sensor fits has its size, the other follows from the image.
@@ -83,6 +99,15 @@ def set_panorama(out, camera, aspect, shift_x, report):
         else:
             side = data.sensor_height if data.sensor_fit == "VERTICAL" else data.sensor_width
             out.sensor[:] = [side * aspect, side]
+        if kind == "FISHEYE_LENS_POLYNOMIAL":
+            like = equisolid_like([getattr(own, f"fisheye_polynomial_k{k}") for k in range(5)], out.fisheye_fov / 2, math.hypot(*out.sensor) / 2)
+            if like is None:
+                report.note(f"{camera.name} (Fisheye Lens Polynomial)", "Panoramas taken as perspective ones")
+                out.panorama = 0
+                return False
+            out.fisheye_lens = like[0]
+            if like[1] > LIKE_EQUISOLID:
+                report.note(f"{camera.name} ({math.degrees(like[1]):.1f} degrees off at most)", "Polynomial fisheyes, taken as the nearest equisolid lens")
     elif kind in {"MIRRORBALL", "EQUIANGULAR_CUBEMAP_FACE"}:
         out.panorama = library.MIRROR_BALL if kind == "MIRRORBALL" else library.EQUIANGULAR_CUBE
     else:

@@ -335,8 +335,8 @@ class Collector:
         self.check()
         self.scene.meshes = [mesh for mesh in self._meshes.values() if mesh is not None and mesh.transforms] + self._flat
         self.scene.meshes += [mesh for made in self._shapes.values() for mesh in made if mesh.transforms]
-        if self.profiles.falloffs:
-            self.scene.lights = lights.with_falloffs(self.scene.lights, self.profiles, self.scene.meshes, self.report, self.check)
+        if self.profiles.later:
+            self.scene.lights = lights.settled(self.scene.lights, self.profiles, self.scene.meshes, self.check)
         scene = self.depsgraph.scene_eval
         bake = (lambda world: self.bake(world, scene.frame_current, self.check)) if self.bake is not None else None
         world = (getattr(layer, "world_override", None) or scene.world) if layer.use_sky else None
@@ -394,7 +394,8 @@ class Collector:
     def _variants(self, ob, slots, pane):
         """(materials by slot, mask): one for each set of materials that some kinds of rays see alike."""
         held_out = ob.is_holdout or ob.holdout_get(view_layer=self.depsgraph.view_layer_eval)  # its own, or its collection's
-        of_slots = [self.materials.numbers(material, pane) for material in slots]
+        bare = ob.type == "MESH" and not len(ob.data.uv_layers)
+        of_slots = [self.materials.numbers(material, pane, bare) for material in slots]
         if ob.as_pointer() not in self._looked_at:
             self._looked_at.add(ob.as_pointer())
             self._check_flags(ob)

@@ -28,9 +28,9 @@ class Falloff:
         return factor * distance ** 2 / (self.smooth + distance ** 2) if self.smooth > 0 else factor
 
 
-def distances(meshes, place, axes, check):
-    """(ROWS, 2 ROWS) distances to what casts shadows, NaN where there is nothing: an equirectangular image whose right is -x,
-    up -z, back +y of the lamp's `axes`."""
+def surroundings(meshes, place, axes, check):
+    """Distances (ROWS, 2 ROWS) to what casts shadows, NaN where there is nothing, and its normals, which face the lamp:
+    equirectangular images whose right is -x, up -z, back +y of the lamp's `axes`."""
     with library.Scene(library.Device(runtime.require(), 1)) as scene, library.Integrator(scene.device, "exhaustive") as integrator:
         scene.set_materials([library.Material(opacity=1.0)])
         for mesh in meshes:
@@ -46,7 +46,26 @@ def distances(meshes, place, axes, check):
         with library.Render(integrator, scene, 2 * ROWS, ROWS) as render:
             while render.wait(1000).state == library.RUNNING:
                 check()
-            return np.where(render.read("alpha")[..., 0] > 0, render.read("depth")[..., 0], np.nan)
+            return np.where(render.read("alpha")[..., 0] > 0, render.read("depth")[..., 0], np.nan), render.read("normal")
+
+
+def by_angles(image):
+    """(2 ROWS, ROWS, ...): by horizontal angle, 0 first, and vertical angle, as lamp_textures.around has them."""
+    return np.roll(image, -ROWS, 1).swapaxes(0, 1)
+
+
+def angles():
+    """(vertical, horizontal) of what by_angles gives."""
+    return (np.arange(ROWS) + 0.5) * math.pi / ROWS, (np.arange(2 * ROWS) + 0.5) * math.pi / ROWS
+
+
+def table_of(values):
+    """(vertical, horizontal, values) of all angles, to the poles and all around, from what by_angles gives."""
+    seam = 0.5 * (values[:1] + values[-1:])
+    values = np.concatenate([seam, values, seam])
+    values = np.concatenate([np.full((len(values), 1), values[:, 0].mean()), values, np.full((len(values), 1), values[:, -1].mean())], 1)
+    vertical, horizontal = angles()
+    return np.concatenate([[0], vertical, [math.pi]]), np.concatenate([[0], horizontal, [2 * math.pi]]), values
 
 
 def applied(name, lamp, data, matrix, falloff, meshes, profiles, report, check):
@@ -55,7 +74,7 @@ def applied(name, lamp, data, matrix, falloff, meshes, profiles, report, check):
     axes = m[:, :3] / np.maximum(np.linalg.norm(m[:, :3], axis=0), 1e-30)
     if lamp.type == library.SUN or not meshes:
         return [lamp]
-    distance = distances(meshes, m[:, 3], axes, check)
+    distance = surroundings(meshes, m[:, 3], axes, check)[0]
     factors = falloff.at(np.where(np.isfinite(distance), distance, np.nanmedian(distance) if np.isfinite(distance).any() else 1.0))
     report.note(name, "Light Falloff, by how far away things are around the lamp")
     if lamp.profile or lamp.type not in {library.POINT, library.SPOT}:
@@ -64,12 +83,7 @@ def applied(name, lamp, data, matrix, falloff, meshes, profiles, report, check):
         weights = np.sin((np.arange(ROWS) + 0.5) * math.pi / ROWS)[:, None] * np.maximum(0, down) * np.isfinite(distance)
         lamp.value *= float((factors * weights).sum() / weights.sum()) if weights.any() else 1.0
         return [lamp]
-    columns = np.roll(factors, -ROWS, 1).T  # horizontal angle 0 first, as lamp_textures.around has it
-    seam = 0.5 * (columns[:1] + columns[-1:])
-    values = np.concatenate([seam, columns, seam])
-    values = np.concatenate([np.full((len(values), 1), values[:, 0].mean()), values, np.full((len(values), 1), values[:, -1].mean())], 1)
-    vertical = np.concatenate([[0], (np.arange(ROWS) + 0.5) * math.pi / ROWS, [math.pi]])
-    horizontal = np.concatenate([[0], (np.arange(2 * ROWS) + 0.5) * math.pi / ROWS, [2 * math.pi]])
+    vertical, horizontal, values = table_of(by_angles(factors))
     radius, lamp.radius = lamp.radius, 0.0
     key = "falloff", tuple(m.ravel().round(6).tolist()), falloff.power, falloff.smooth
     if not profiles.add_table(name, data, key, (name, vertical, horizontal, values / PER_CANDELA), np.eye(3), matrix, lamp,

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lamps, in the units of the Blender that runs (docs/units.md): each type agrees with Cycles to 1 %."""
+import functools
 import math
 import os
 
 import bpy
 import numpy as np
 
-from . import compat, falloffs, ies, lamp_textures
+from . import compat, falloffs, ies, lamp_textures, sheared
 from .ies import PER_CANDELA
 from .lumicut import library
 from .directions import Directions
@@ -124,7 +125,7 @@ class Profiles:
 
     def __init__(self, report):
         self.report, self.items = report, []
-        self.falloffs = {}  # (lamp's data, matrix, Falloff) by the id of a converted light
+        self.later = {}  # by the id of a converted light: (light, meshes, check) -> [library.Light] in its place
         self._tables, self._numbers = {}, {}
 
     def _table(self, node):
@@ -244,19 +245,28 @@ def convert_light(name, light, matrix, images, report, profiles, picture_number)
     emission, of_ies, compiled, falloff = emission_of(light, images, report)
     made = _converted(name, light, matrix, images, report, profiles, picture_number, emission, of_ies, compiled)
     if falloff is not None and not falloff.plain():
+        def fallen(part, meshes, check, before):
+            parts = [part] if before is None else before(part, meshes, check)
+            return [p for part in parts for p in falloffs.applied(name, part, light, matrix, falloff, meshes, profiles, report, check)]
+
+        matrix = matrix.copy()
         for part in made:
-            profiles.falloffs[id(part)] = light, matrix.copy(), falloff
+            profiles.later[id(part)] = functools.partial(fallen, before=profiles.later.get(id(part)))
     return made
 
 
-def with_falloffs(lamps, profiles, meshes, report, check):
-    """[(name, library.Light)] of such, in which the distance to `meshes` counts where Light Falloff says so."""
+def settled(lamps, profiles, meshes, check):
+    """[(name, library.Light)] of such, where what the lamp lights, `meshes`, decides what it is."""
     made = []
     for name, lamp in lamps:
-        known = profiles.falloffs.get(id(lamp))
-        made += [(name, lamp)] if known is None else \
-            [(name, part) for part in falloffs.applied(name, lamp, *known, meshes, profiles, report, check)]
+        later = profiles.later.get(id(lamp))
+        made += [(name, lamp)] if later is None else [(name, part) for part in later(lamp, meshes, check)]
     return made
+
+
+def edges_of(light, m):
+    """Whole edges of an area lamp, which may be oblique."""
+    return m[:, 0] * light.size, m[:, 1] * (light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size)
 
 
 def _converted(name, light, matrix, images, report, profiles, picture_number, emission, of_ies, compiled):
@@ -273,9 +283,14 @@ def _converted(name, light, matrix, images, report, profiles, picture_number, em
                 report.note(name, "Stretched spots of a radius, taken as 32 points")
             return falloffs.spread(out, radius)
         out.radius = radius
+    m = np.array(matrix)[:3]
+    if light.type == "AREA" and sheared.is_sheared(*edges_of(light, m), m[:, 2], out.type == library.DISK):
+        if compiled is None:
+            sheared.apply(name, light, out, *edges_of(light, m), -m[:, 2], report, profiles)
+        else:
+            report.note(name, "Sheared area lamps with textures, made straight")
     if compiled is None:
         return [out]
-    m = np.array(matrix)[:3]
     expr = compiled(m[:, :3] / np.maximum(np.linalg.norm(m[:, :3], axis=0), 1e-30), m[:, 3])
     own = np.array(out.color)
 
@@ -329,7 +344,7 @@ def _plain_light(name, light, matrix, emission, of_ies, report, profiles):
         report.note(name, "Max Bounces of lamps left out")
     m = np.array(matrix)[:3]
     # The lamp's own axes; scale is kept for areas alone.
-    x, y, z = m[:, 0], m[:, 1], m[:, 2]
+    z = m[:, 2]
     out = library.Light(unit=library.WATT, value=value)
     out.color[:] = [float(c) for c in colour]
     if not getattr(getattr(light, "cycles", None), "cast_shadow", light.use_shadow):
@@ -342,15 +357,10 @@ def _plain_light(name, light, matrix, emission, of_ies, report, profiles):
         of_ies = None
     if light.type == "AREA":
         out.type = AREA_TYPES[light.shape]
-        height = light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
-        u, v = x * light.size, y * height
-        lu = np.linalg.norm(u)
-        if not (lu > 0 and np.linalg.norm(v) > 0):
+        u, v = edges_of(light, m)
+        if not (np.linalg.norm(u) > 0 and np.linalg.norm(v) > 0):
             return None
-        straight = v - u * (v @ u) / (lu * lu)
-        if np.linalg.norm(v - straight) > 1e-3 * np.linalg.norm(v):
-            report.note(name, "Sheared area lamps made straight")
-        v = straight
+        v = v - u * ((v @ u) / (u @ u))
         if np.cross(u, v) @ forward < 0:
             v = -v
         out.u[:], out.v[:] = u.tolist(), v.tolist()

@@ -26,6 +26,11 @@ class Mapping:
     def is_plain(self):
         return self.key == ("UV", "", ((1, 0, 0), (0, 1, 0)))
 
+    def is_upright(self):
+        """Whether the coordinates grow as those of the UV map do."""
+        (a, b, _), (d, e, _) = self.matrix
+        return self.source == "UV" and a > 0 and e > 0 and abs(b) < 1e-6 * a and abs(d) < 1e-6 * e
+
 
 def whole(mapping):
     return np.vstack([mapping.matrix, [0, 0, 1]])

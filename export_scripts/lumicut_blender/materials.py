@@ -15,7 +15,7 @@ from .lumicut import library
 from .images import Images, Picture, image_of
 from .mappings import Mapping, aligned
 from .nodes import LUMINANCE, ONE, ZERO, Evaluator, Value, fresnel, input_of
-from .programs import NORMAL, CannotCompile, Compiler, ProgramPicture, of_picture, program_of, bump_of
+from .programs import NORMAL, CannotCompile, Compiler, ProgramPicture, bump_of, const, mapped_normal, of_picture, program_of
 
 HOLE = 1e-3  # an opacity that the library takes as "not there"; 0 means 1 to it
 LARGEST_FACTOR = 1e6  # of a texture, in the library
@@ -140,6 +140,10 @@ def index_like(share):
 
 def luminance(value):
     return value.scalar()
+
+
+def same_hue(a, b):
+    return abs(a.mean() / max(luminance(a), 1e-9) - b.mean() / max(luminance(b), 1e-9)).max() <= 0.05
 
 
 class SurfaceReader(Evaluator):
@@ -291,7 +295,8 @@ class SurfaceReader(Evaluator):
             colour = self.value(source.inputs["Color"], stack)
             strength = self.number(source.inputs["Strength"], stack, "normal strength")
             if colour.picture is not None and not colour.picture.is_by_view() and (colour.factor == 1).all() and \
-                    not isinstance(colour.picture, ProgramPicture) and not source.inputs["Strength"].is_linked:
+                    not isinstance(colour.picture, ProgramPicture) and not source.inputs["Strength"].is_linked and \
+                    colour.picture.mapping.is_upright() and colour.picture.mapping.uv_map == source.uv_map:
                 if strength > 0 and self.normals is None:
                     self.normals = colour.picture, min(10.0, strength)
                 elif strength > 0 and self.normals[0].key != colour.picture.key:
@@ -320,7 +325,27 @@ class SurfaceReader(Evaluator):
         return {"roughness": value.scalar(), "rough_picture": value if value.picture is not None else None}
 
     def gloss(self, node, stack):
-        return {"roughness": 0.0} if getattr(node, "distribution", "") == "SHARP" else self.rough(node, stack)
+        return {"roughness": 0.0} if getattr(node, "distribution", "") == "SHARP" else self.even(node, stack, self.rough(node, stack))
+
+    def even(self, node, stack, gloss):
+        """The same roughness, where it is one across another, as one: the lobe's mean width."""
+        socket = input_of(node, "Anisotropy", "Anisotropic")
+        strength = 0.0 if socket is None else self.number(socket, stack, "anisotropy")
+        if abs(strength) < 1e-3:
+            return gloss
+        self.note(node.bl_label, "Anisotropic gloss, taken as even and as wide in the mean")
+        if socket.name == "Anisotropic":  # a Principled BSDF's
+            stretch = math.sqrt(1 - 0.9 * min(1.0, max(0.0, strength)))
+        else:
+            stretch = 1 - min(0.99, abs(strength))
+
+        def widened(r):
+            wide, narrow = np.minimum(1, r * r / stretch), r * r * stretch
+            return np.sqrt((wide + narrow) / 2)
+
+        picture = gloss["rough_picture"]
+        picture = None if picture is None else self.apply("anisotropy", widened, picture)
+        return {"roughness": float(widened(gloss["roughness"])), "rough_picture": picture}
 
     def closure_bsdf_diffuse(self, node, stack):
         self.bumps(node, stack)
@@ -458,12 +483,9 @@ class SurfaceReader(Evaluator):
             socket = input_of(node, *names)
             return self.value(socket, stack) if socket is not None else ZERO
 
-        for names, text in ((("Anisotropic",), "anisotropy"), (("Thin Film Thickness",), "thin film")):
-            socket = input_of(node, *names)
-            if socket is None:
-                continue
-            if not self.value(socket, stack).is_zero():
-                self.note(text, "Principled features left out")
+        film = input_of(node, "Thin Film Thickness")
+        if film is not None and not self.value(film, stack).is_zero():
+            self.note("thin film", "Principled features left out")
         base = value("Base Color")
         scattered = value("Subsurface", "Subsurface Weight")
         if not scattered.is_zero():
@@ -490,7 +512,7 @@ class SurfaceReader(Evaluator):
             tint = None
         dielectric = self.complement(metallic)
         opaque = self.multiply(dielectric, self.complement(transmission))
-        gloss = self.rough(node, stack)
+        gloss = self.even(node, stack, self.rough(node, stack))
         clearcoat, beneath = self.clear_coat(node, stack)
         sheen, left = self.sheen(node, stack, base)
         base, f0 = self.multiply(beneath, base), self.multiply(beneath, f0)
@@ -578,14 +600,28 @@ class Materials:
         self.converted.append(converted)
         return len(self.converted) - 1
 
-    def numbers(self, material, pane=lambda: 0):
+    def numbers(self, material, pane=lambda: 0, bare=False):
         """Index of a Blender material (None: the default grey) for each kind of ray, in the order of library.RAYS; kinds
         that see it alike have one. `pane`: flags of glass on this mesh, asked of glass alone: light goes straight through
-        panes; bodies bend it."""
+        panes; bodies bend it. `bare`: the mesh has no UV map."""
         key = None if material is None else material.name_full
         if key not in self._numbers:
             self._numbers[key] = self._number_by_ray(material)
-        return tuple(self._on_mesh(number, pane) for number in self._numbers[key])
+        return tuple(self._on_mesh(self._without_uvs(number) if bare else number, pane) for number in self._numbers[key])
+
+    def _without_uvs(self, number):
+        """Index of the same material, whose normal map is one colour then, and whose tangents a program must have."""
+        base = self.converted[number]
+        picture = base.pictures.get("normal")
+        if picture is None or isinstance(picture, ProgramPicture):
+            return number
+        if (number, "bare") not in self._numbers:
+            bent = mapped_normal(of_picture(picture), const(base.values.normal_strength), "")
+            pictures = {slot: p for slot, p in base.pictures.items() if slot != "height"} | {"normal": ProgramPicture(base.name, bent)}
+            values = type(base.values).from_buffer_copy(base.values)
+            values.normal_texture, values.normal_strength, values.height_texture = self.picture_number(pictures["normal"]), 1.0, 0
+            self._numbers[number, "bare"] = self._add(dataclasses.replace(base, pictures=pictures, values=values))
+        return self._numbers[number, "bare"]
 
     def _number_by_ray(self, material):
         first = self._convert(material, "camera")
@@ -676,7 +712,7 @@ class Materials:
         every = [slot for slot in (*SLOTS, "roughness", "metallic", "normal", "height")
                  if slot in pictures and not pictures[slot].is_by_view() and not isinstance(pictures[slot], ProgramPicture)]
         together = aligned([pictures[slot] for slot in every], lambda p: self.report.note(f"{name} ({p})", COARSE))
-        if together is None:
+        if together is None or "normal" in every and not together[0].mapping.is_upright():  # which tangents follow
             # Each looked up by a program of its own, but for those of the first mapping; normals and heights stay.
             first = next((pictures[slot] for slot in ("normal", "height") if slot in every), pictures[every[0]])
             apart = [slot for slot in every if pictures[slot].mapping != first.mapping]
@@ -745,8 +781,7 @@ class Materials:
             f0, glass = surface.by_place.f0, 0.0
             return {**pictured, "diffuse": surface.by_place.base, "specular": self._specular(f0, glass, name, m)}
         parts = [value for value in (diffuse, surface.metal, surface.glass) if luminance(value) > 0]
-        hues = [value.mean() / luminance(value) for value in parts]
-        if len(parts) > 1 and any(abs(hue - hues[0]).max() > 0.05 for hue in hues):
+        if not all(same_hue(value, parts[0]) for value in parts):
             # One base colour must do.
             if glass >= 0.5 * (d + metal + glass):
                 self.report.note(name, "Glass mixed with shaders of other colours, taken as glass alone")

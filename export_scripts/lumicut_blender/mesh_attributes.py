@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What texture programs ask of meshes and objects: coordinates, colour and other attributes, random numbers.
 
-An attribute is named by a tuple: ("uv", map), ("layer", name), ("generated",), ("undisplaced",), ("island",) are of meshes; ("strand", output) of
+An attribute is named by a tuple: ("uv", map), ("tangent", map), what tangents follow, ("layer", name), ("generated",), ("undisplaced",), ("island",) are of meshes; ("strand", output) of
 hair and curves; ("object", output),
 ("property", name), ("world_to_object",) and ("object_to_world",) of instances.
 """
@@ -117,6 +117,8 @@ class AttributeReader:
         kind = name[0]
         if kind == "uv":
             return "corner", layer(name[1], loops)
+        if kind == "tangent":
+            return self.tangents(name[1], layer, loops)
         if kind == "strand":
             return None  # 0, as of what is none
         if kind == "generated":
@@ -133,6 +135,19 @@ class AttributeReader:
         low = np.array(self.mesh.texspace_location) - np.array(self.mesh.texspace_size)
         size = 2 * np.array(self.mesh.texspace_size)
         return ((places - low) / np.where(size != 0, size, 1)).astype(np.float32)
+
+    def tangents(self, name, layer, loops):
+        """As Cycles has them: of a UV map; of none by that name there are none; without any they go around the object's z axis,
+        and along x where that says nothing."""
+        layers = self.mesh.uv_layers
+        if name or len(layers):
+            return ("corner", layer(name, loops)) if not name or name in layers else None
+        at = self.fetch(self.mesh.vertices, "undeformed_co", len(self.mesh.vertices), 3, np.float32)
+        cosine = at[:, 2] / np.maximum(np.linalg.norm(at, axis=1), 1e-30)
+        if np.ptp(cosine) < 1e-6:
+            return "vertex", at[:, :2] * np.float32((1, -1))
+        turn = 0.5 - np.arctan2(at[:, 0], at[:, 1]) / (2 * np.pi)
+        return "vertex", np.stack([turn, 1 - np.arccos(np.clip(cosine, -1, 1)) / np.pi], 1).astype(np.float32)
 
     def island(self):
         count = len(self.mesh.vertices)

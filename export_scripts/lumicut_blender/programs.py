@@ -188,6 +188,16 @@ def of_picture(picture):
     return image(picture, base)
 
 
+def mapped_normal(colour, strength, uv_map):
+    """The normal that a tangent-space colour gives."""
+    if NORMAL_MAPS_BY_SLOPE and not strength.is_number(1):
+        share = clamp(strength)
+        n = vector_math("MULTIPLY", vector_math("MULTIPLY_ADD", colour, const(2), const(-1)), combine(strength, strength, share))
+        n = vector_math("ADD", n, combine(ZERO, ZERO, complement(share)))
+        colour, strength = vector_math("MULTIPLY_ADD", n, HALF, HALF), ONE
+    return Expr("normal_map", 1, (colour, strength), ("tangent", uv_map), mean=0)
+
+
 def bump_of(height, moved):
     """The normal that a displacement by height gives. `moved`: of vertices too, from where the height is looked up."""
     if moved:
@@ -481,12 +491,7 @@ class Compiler:
     def _normal_map(self, node, output, stack):
         colour, strength = self.get(node, stack, "Color"), self.get(node, stack, "Strength")
         if node.space == "TANGENT":
-            if NORMAL_MAPS_BY_SLOPE and not strength.is_number(1):
-                share = clamp(strength)
-                n = vector_math("MULTIPLY", vector_math("MULTIPLY_ADD", colour, const(2), const(-1)), combine(strength, strength, share))
-                n = vector_math("ADD", n, combine(ZERO, ZERO, complement(share)))
-                colour, strength = vector_math("MULTIPLY_ADD", n, HALF, HALF), ONE
-            return Expr("normal_map", 1, (colour, strength), ("uv", node.uv_map), mean=0)
+            return mapped_normal(colour, strength, node.uv_map)
         n = vector_math("MULTIPLY_ADD", colour, const(2), const(-1))
         if node.space.startswith("BLENDER"):
             n = vector_math("MULTIPLY", n, const((1, -1, -1)))

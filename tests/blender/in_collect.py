@@ -20,8 +20,8 @@ def collected(max_shininess=1000.0):
 
 
 def the_material(m, max_shininess=1000.0):
-    """(library.Material, notes, data) of a plane with this material."""
-    h.add_plane(material=m)
+    """(library.Material, notes, data) of a plane with this material and a UV map."""
+    h.add_plane(material=m).data.uv_layers.new(name="UVMap")
     data, notes = collected(max_shininess)
     return dict(data.materials)[m.name], notes, data
 

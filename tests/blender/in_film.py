@@ -68,11 +68,20 @@ class Panoramas(unittest.TestCase):
         self.compare((64, 32), shift, panorama_type="EQUIRECTANGULAR")
         self.compare((32, 48), shift, panorama_type="FISHEYE_EQUISOLID", fisheye_fov=3.0, fisheye_lens=10.5)
 
+    def test_polynomial_fisheyes_are_near_an_equisolid_one(self):
+        for size, fov, listed in (((40, 40), 3.0, True), ((48, 32), 3.0, True), ((40, 40), 0.5, False)):
+            with self.subTest(size=size, fov=fov):
+                self.compare(size, panorama_type="FISHEYE_LENS_POLYNOMIAL", fisheye_fov=fov)
+                self.assertEqual(any("nearest equisolid" in note for note in h.last_notes()), listed)
+
     def test_others_are_listed(self):
         scene = h.new_scene(8, 8)
         data = scene.camera.data
         data.type = "PANO"
-        (data if hasattr(data, "panorama_type") else data.cycles).panorama_type = "FISHEYE_LENS_POLYNOMIAL"
+        own = data if hasattr(data, "panorama_type") else data.cycles
+        own.panorama_type = "FISHEYE_LENS_POLYNOMIAL"
+        for k in range(5):
+            setattr(own, f"fisheye_polynomial_k{k}", 0.0)
         with h.quiet():
             h.set_lumicut(vpls=10)
             h.render()

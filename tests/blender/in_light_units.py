@@ -74,6 +74,23 @@ class LightUnits(unittest.TestCase):
                             shadow_soft_size=radius)
                 self.agree(block=0.15 if blend == 0 else 0.1)  # edges, as above
 
+    def test_area_lamps_that_a_parent_shears(self):
+        """Edges across each other in the lamp's plane, then a plane that is not across the matrix's z axis either: disks are
+        laid across it then, which only their own depth tells."""
+        flat, tilted = ((2, 1, 1), (0, 0, 0.785)), ((1.5, 1, 1), (0.15, 0.3, 0.3))
+        for shape, (scale, turn), spread, block in (("RECTANGLE", flat, math.pi, 0.05), ("RECTANGLE", tilted, math.pi, BLOCK),
+                                                    ("ELLIPSE", flat, 2.2, BLOCK), ("DISK", tilted, math.pi, 0.08)):
+            with self.subTest(shape=shape, scale=scale):
+                self.setUp()
+                parent = h.link(bpy.data.objects.new("Parent", None))
+                parent.scale, parent.location = scale, (0.3, 0.2, 1.5)
+                lamp = h.add_light("AREA", (0, 0, 0), 100, turn, shape=shape, size=1.0, spread=spread)
+                lamp.data.size_y = 0.6
+                lamp.parent = parent
+                self.agree(samples=256, block=block, lights=10000)
+                said = [note for note in h.last_notes() if "heared" in note]
+                self.assertEqual(bool(said), shape == "RECTANGLE" or turn == tilted[1], said)
+
     def test_tilted_spot(self):
         h.add_light("SPOT", (1.5, 0, 2.5), 200, (0, math.radians(35), 0), spot_size=math.radians(90), spot_blend=0.3,
                     shadow_soft_size=0)

@@ -1,4 +1,5 @@
 """Materials beside Cycles of the same Blender: spheres and boards under a lamp and an even sky, path traced by both."""
+import math
 import os
 import unittest
 
@@ -212,6 +213,34 @@ class Materials(unittest.TestCase):
             self.assertEqual(len(h.last_notes()), 1)
             self.assertIn("Sheen by the angle of view", h.last_notes()[0])
 
+    def test_partly_metallic_colours_of_single_scattering(self):
+        """Their metal, darkened, has another hue than their diffuse part. As a coat it was .93 of Cycles by the sky, .87 by the sun."""
+        for sky in (True, False):
+            with self.subTest(sky=sky):
+                h.new_scene(24, 24)
+                if sky:
+                    h.set_world((1, 1, 1))
+                else:
+                    h.add_light("SUN", energy=3, rotation=(0.6, 0.4, 0), angle=0.2)
+                m, _ = principled("Rusty", multi=False, Roughness=0.8, Metallic=0.8, **{"Base Color": (0.7, 0.5, 0.3)})
+                h.add_sphere(1.6, (0, 0, 0), m, 48)
+                ours, theirs = (h.radiance(image) for image in h.both(64, 4))
+                self.assertLess(abs(ours.mean() / theirs.mean() - 1), 0.03)
+                self.assertNotIn("Gloss mixed", " ".join(h.last_notes()))
+
+    def test_anisotropic_gloss_is_as_bright_in_the_mean(self):
+        """As an even lobe of its own roughness it was 1.23 of Cycles."""
+        h.new_scene(24, 24)
+        h.set_world((1, 1, 1))
+        m = h.material("Brushed")
+        node = h.shader(m, "ShaderNodeBsdfAnisotropic" if h.VERSION < (4, 0, 0) else "ShaderNodeBsdfGlossy", Roughness=0.5, Color=(0.7, 0.7, 0.7, 1))
+        node.distribution = "GGX"
+        node.inputs["Anisotropy"].default_value = 0.9
+        h.add_sphere(1.6, (0, 0, 0), m)
+        ours, theirs = (h.radiance(image) for image in h.both(64, 4))
+        self.assertLess(abs(ours.mean() / theirs.mean() - 1), 0.12)
+        self.assertTrue([note for note in h.last_notes() if note.startswith("Anisotropic gloss")])
+
     def test_light_passes_what_shines_and_hides_nothing(self):
         """Transparent and Emission added: a flame before a wall, as Cycles has it."""
         h.set_world((0.3, 0.3, 0.3))
@@ -360,3 +389,67 @@ class Materials(unittest.TestCase):
                     # it would dim them: of 4.x's coat, four times as strong, that is 2 %.
                     delta = 0.01 if bpy.app.version < (4, 0, 0) else 0.03
                     self.assertAlmostEqual(h.radiance(h.render()).mean() / truth, 1, delta=delta)
+
+
+class Tangents(unittest.TestCase):
+    """Normal maps follow the UV map that their node names, however their image lies on it, and have tangents without one."""
+
+    def setUp(self):
+        h.new_scene(48, 48)
+        h.add_light("SUN", energy=3, rotation=(0.6, 0.4, 0))
+
+    def mapped(self, coordinates=None, turn=0.0, scale=(1, 1, 1), uv_map=""):
+        """A material with a normal map whose image lies on an output (node, name), turned."""
+        m = h.material("Mapped")
+        normal_mapped(m, h.shader(m, "ShaderNodeBsdfDiffuse", Color=(0.8, 0.8, 0.8, 1)), picture("normals", tilted), 1.0)
+        nodes, links = m.node_tree.nodes, m.node_tree.links
+        next(node for node in nodes if node.type == "NORMAL_MAP").uv_map = uv_map
+        if coordinates is not None:
+            source, turned = nodes.new(coordinates[0]), nodes.new("ShaderNodeMapping")
+            if coordinates[0] == "ShaderNodeUVMap":
+                source.uv_map = coordinates[1]
+            turned.inputs["Rotation"].default_value, turned.inputs["Scale"].default_value = (0, 0, turn), scale
+            links.new(source.outputs[0 if coordinates[0] == "ShaderNodeUVMap" else coordinates[1]], turned.inputs["Vector"])
+            links.new(turned.outputs[0], next(node for node in nodes if node.type == "TEX_IMAGE").inputs["Vector"])
+        return m
+
+    def agree(self, typical):
+        """`typical`: how far blocks may be off in the mean."""
+        ours, theirs = (h.blocks(h.radiance(image)) for image in h.both(64, 4))
+        self.assertLess(abs(ours.mean() / theirs.mean() - 1), 0.01)
+        self.assertLess((np.abs(ours - theirs) / np.maximum(theirs, 0.1 * theirs.max())).mean(), typical)
+
+    def test_images_that_lie_otherwise_than_the_tangents(self):
+        uv = "ShaderNodeTexCoord", "UV"
+        for case in ({"coordinates": uv, "turn": 1.57}, {"coordinates": uv, "scale": (-1, 1, 1)}, {"coordinates": ("ShaderNodeUVMap", "B")},
+                     {"uv_map": "B"}, {"uv_map": "none"}, {"coordinates": ("ShaderNodeTexCoord", "Generated"), "turn": 0.8}):
+            with self.subTest(**case):
+                self.setUp()
+                plane = h.add_plane(2.5, material=self.mapped(**case))
+                plane.data.uv_layers.new(name="A").data.foreach_set("uv", [0, 0, 1, 0, 1, 1, 0, 1])
+                plane.data.uv_layers.new(name="B").data.foreach_set("uv", [1, 0, 1, 1, 0, 1, 0, 0])
+                self.agree(0.02)
+
+    def test_a_colour_laid_otherwise_leaves_them_alone(self):
+        m = self.mapped()
+        nodes, links = m.node_tree.nodes, m.node_tree.links
+        colour, turned, uv = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeMapping"), nodes.new("ShaderNodeTexCoord")
+        colour.image = picture("colour", waves)
+        turned.inputs["Rotation"].default_value = (0, 0, math.pi / 2)
+        turned.inputs["Scale"].default_value = (0.5, 0.5, 1)
+        links.new(uv.outputs["UV"], turned.inputs["Vector"])
+        links.new(turned.outputs[0], colour.inputs["Vector"])
+        links.new(colour.outputs[0], next(node for node in nodes if node.type == "BSDF_DIFFUSE").inputs["Color"])
+        h.add_plane(2.5, material=m).data.uv_layers.new(name="A").data.foreach_set("uv", [0, 0, 1, 0, 1, 1, 0, 1])
+        self.agree(0.02)
+
+    def test_meshes_without_uv_maps(self):
+        for coordinates, ball in ((None, False), (("ShaderNodeTexCoord", "Object"), False), (None, True)):
+            with self.subTest(coordinates=coordinates, ball=ball):
+                self.setUp()
+                m = self.mapped(coordinates)
+                if ball:  # lying, as tangents run together where the z axis leaves it
+                    h.add_sphere(1.3, (0, 0, 0), m).rotation_euler = (1.4, 0, 0)
+                else:
+                    h.add_plane(2.5, material=m)
+                self.agree(0.02)
