@@ -100,8 +100,7 @@ void trace_any(const TraceScene& scene, std::span<Ray> rays) {
 void trace_points(const TraceScene& scene, const BundleOrigin& origin, const float* px, const float* py,
                   const float* pz, size_t n, uint8_t* occluded) {
   const bool valid = within(origin.light, origin.directional ? scene.limits.direction : scene.limits.origin);
-  if (scene.top->root == kEmptyChild || origin.mask == 0 || !valid ||
-      (origin.directional && origin.light == Vec3f{})) {
+  if (scene.top->root == kEmptyChild || origin.mask == 0 || !valid || (origin.directional && origin.light == Vec3f{})) {
     std::fill_n(occluded, n, uint8_t{0});
     return;
   }

@@ -5,7 +5,6 @@ Arrays are filled by foreach_get in the type that Blender stores, which is a mem
 each set of materials; its instances are transforms.
 """
 import bpy
-import mathutils
 import numpy as np
 
 from . import lights, linking, mesh_attributes, program_values, programs, strands, worlds
