@@ -13,7 +13,7 @@ bl_info = {
 if "bpy" in locals():  # reloaded by the host: its parts, too, from the bottom up
     import importlib
     for _part in (library, compat, report, scene_data, images, mappings, runtime, programs, program_values, nodes, mesh_attributes, linking, view_albedos, materials, ies, sky, directions,  # noqa: F821
-                  lamp_textures, falloffs, lights, worlds, cameras, collect, motion, hit_passes, properties, migration, shadow_catcher, passes, export, viewport,  # noqa: F821
+                  lamp_textures, falloffs, sheared, lights, worlds, cameras, collect, motion, hit_passes, properties, migration, shadow_catcher, passes, export, viewport,  # noqa: F821
                   engine, preferences, operators, panels, data_panels):  # noqa: F821
         importlib.reload(_part)
 else:
@@ -24,7 +24,7 @@ else:
     from .lumicut import library  # noqa: F401
     from . import (cameras, collect, compat, data_panels, directions, engine, export, falloffs, hit_passes, ies, images, lamp_textures, lights, linking, mappings, materials,  # noqa: F401
                    mesh_attributes, migration, motion, nodes, operators, panels, passes, preferences, program_values, programs, properties, report,
-                   runtime, scene_data, shadow_catcher, sky, view_albedos, viewport, worlds)
+                   runtime, scene_data, shadow_catcher, sheared, sky, view_albedos, viewport, worlds)
 
 import bpy  # noqa: E402, F401
 

@@ -620,7 +620,7 @@ class Materials:
             pictures = {slot: p for slot, p in base.pictures.items() if slot != "height"} | {"normal": ProgramPicture(base.name, bent)}
             values = type(base.values).from_buffer_copy(base.values)
             values.normal_texture, values.normal_strength, values.height_texture = self.picture_number(pictures["normal"]), 1.0, 0
-            self._numbers[number, "bare"] = self._add(dataclasses.replace(base, pictures=pictures, values=values))
+            self._numbers[number, "bare"] = self._add(dataclasses.replace(base, name=f"{base.name} (no UV map)", pictures=pictures, values=values))
         return self._numbers[number, "bare"]
 
     def _number_by_ray(self, material):

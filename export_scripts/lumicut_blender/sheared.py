@@ -3,8 +3,8 @@
 
 A round one is the ellipse that its axes span, and shines by the cosine to the matrix's own z axis.
 
-Of a rectangle Cycles takes coordinates along the oblique axes x and y (of length 1) as if they stood upright. What lies at d
-from a point is seen from there towards Gd, with G = xxᵀ + yyᵀ + zzᵀ and z = x × y; so the lamp is the parallelogram of the
+Of a rectangle Cycles takes coordinates along the oblique axes x and y (of length 1) as if they stood upright. What lies at d is
+seen towards Gd, with G = xxᵀ + yyᵀ + zzᵀ and z = x × y; so the lamp is the parallelogram of the
 axes dual to x and y, moved a little, as the corner is what coordinates count from; what it shines in a direction ω is
 (z·ω)/(ω·Gω)^(3/2); and what it lights sees it in another direction than it is lit from. It becomes points with a table by
 direction, in which the surface that is lit in each direction counts by how it faces the bent light."""
