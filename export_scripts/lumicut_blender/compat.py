@@ -26,6 +26,9 @@ def pass_name(short):
 # Normal Map of tangents: the strength scales what lies along the surface, and leaves some of the rest; 3.4 mixes normals,
 # which is the same for maps of unit length and strengths up to 1. Measured.
 NORMAL_MAPS_BY_SLOPE = bpy.app.version >= (4, 3, 0)
+# Of area lamps whose axes are oblique. Measured.
+SHEARED_FROM_CORNER = bpy.app.version < (4, 3, 0)
+SHEARED_DISKS_LOSE_SPREAD = bpy.app.version >= (4, 3, 0)
 NORMALS_BY_COFACTORS = bpy.app.version >= (4, 3, 0)  # in Vector Transform; 3.4 turns them as vectors. Measured
 FLAT_RECTS = bpy.app.version >= (4, 1, 0)  # pixels of passes are set as one row of numbers
 

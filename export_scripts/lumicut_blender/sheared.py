@@ -5,14 +5,14 @@ A round one is the ellipse that its axes span, and shines by the cosine to the m
 
 Of a rectangle Cycles takes coordinates along the oblique axes x and y (of length 1) as if they stood upright. What lies at d is
 seen towards Gd, with G = xxᵀ + yyᵀ + zzᵀ and z = x × y; so the lamp is the parallelogram of the
-axes dual to x and y, moved a little, as the corner is what coordinates count from; what it shines in a direction ω is
+axes dual to x and y, moved a little where the corner is what coordinates count from (compat.py); what it shines in a direction ω is
 (z·ω)/(ω·Gω)^(3/2); and what it lights sees it in another direction than it is lit from. It becomes points with a table by
 direction, in which the surface that is lit in each direction counts by how it faces the bent light."""
 import math
 
 import numpy as np
 
-from . import falloffs
+from . import compat, falloffs
 from .ies import PER_CANDELA
 from .lumicut import library
 
@@ -44,6 +44,8 @@ def apply(name, light, out, u, v, forward, report, profiles):
         flat = edges - np.outer(forward, forward @ edges)
         if np.linalg.norm(edges - flat) > STRAIGHT * np.linalg.norm(edges):
             report.note(name, "Sheared disks, laid across their axis")
+        if compat.SHEARED_DISKS_LOSE_SPREAD and out.spread > 0 and out.spread < math.pi - 1e-3:
+            report.note(name, "Sheared disks with a spread, of which Cycles shows a part alone")
         axes, lengths, _ = np.linalg.svd(flat, full_matrices=False)  # of the ellipse
         out.u[:] = (axes[:, 0] * lengths[0]).tolist()
         out.v[:] = (np.cross(forward, axes[:, 0]) * lengths[1]).tolist()
@@ -89,7 +91,8 @@ def _points(name, light, lamp, u, v, forward, meshes, profiles, check):
     if not profiles.add_table(name, light, ("sheared", name, tuple(place)), (name, *table), np.eye(3), frame, lamp, "shear"):
         return []
     at = (np.arange(SIDE) + 0.5) / SIDE - 0.5
-    s, t = np.meshgrid(at * long_u - 0.5 * (x @ y) * long_v, at * long_v - 0.5 * (x @ y) * long_u)
+    moved = 0.5 * (x @ y) if compat.SHEARED_FROM_CORNER else 0
+    s, t = np.meshgrid(at * long_u - moved * long_v, at * long_v - moved * long_u)
     parts = []
     for offset in np.column_stack([s.ravel(), t.ravel()]) @ np.linalg.pinv(np.column_stack([x, y])):
         part = library.Light.from_buffer_copy(lamp)
