@@ -11,6 +11,11 @@
 
 namespace lumicut {
 
+// Puts the half of order[begin, end) first whose boxes' middles come first along the longest axis of `middles`, their box;
+// ties by number. Returns where the other half begins.
+uint32_t halve(const std::vector<Aabb>& boxes, const Aabb& middles, std::vector<uint32_t>& order, uint32_t begin,
+               uint32_t end);
+
 class LightBoxes {
  public:
   LightBoxes() = default;

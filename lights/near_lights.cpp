@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "core/spherical.h"
+#include "lights/light_boxes.h"
 
 namespace lumicut {
 
@@ -140,12 +141,7 @@ void NearLights::build(uint32_t node, uint32_t begin, uint32_t end, const Progre
     nodes_[node].first = begin, nodes_[node].count = end - begin;
     return;
   }
-  const int axis = centres.longest_axis();
-  const uint32_t middle = begin + (end - begin) / 2;
-  std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end, [&](uint32_t a, uint32_t b) {
-    const float x = boxes_[a].center()[axis], y = boxes_[b].center()[axis];
-    return x < y || (x == y && a < b);
-  });
+  const uint32_t middle = halve(boxes_, centres, order_, begin, end);
   const auto first = static_cast<uint32_t>(nodes_.size());
   nodes_[node].first = first;
   nodes_.emplace_back().parent = node;
