@@ -134,10 +134,8 @@ Rgb Bsdf::passed_intensity(const Rgb& flux) const { return flux * parameters_.tr
 
 Rgb Bsdf::lambertian_intensity(const Rgb& flux) const {
   const SurfacePoint& p = layers_[0];
-  if (p.grooved()) return flux * p.diffuse * mean_oren_nayar_factor(p.slope, p.again, dot(p.normal, p.mirror));
-  if (parameters_.model != LobeModel::ggx) return flux * parameters_.diffuse * kInvPi;
-  const float even = mean_diffuse_falloff(p.falloff);
-  return flux * p.diffuse * (p.burley() ? even * mean_burley_factor(p.retro, p.dim, dot(p.normal, p.mirror)) : even);
+  if (parameters_.model != LobeModel::ggx && !p.grooved()) return flux * parameters_.diffuse * kInvPi;
+  return flux * p.diffuse * mean_diffuse_factor(p);
 }
 
 std::optional<BsdfSample> Bsdf::sample_specular(float choice, float u, float v, Passage passage) const {

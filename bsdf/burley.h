@@ -20,13 +20,16 @@ inline float burley_edge(float cosine) {
   return m2 * m2 * m;
 }
 
-// What it multiplies Lambert's part by, for a light at `cosine` to the normal and `beta` to the mirror direction.
-inline float burley_factor(const SurfacePoint& p, float cosine, float beta) {
-  const float view = dot(p.normal, p.mirror);
+// What it multiplies Lambert's part by, for a viewer at `view` to the normal and a light at `cosine` to it and at `beta` to
+// the viewer's mirror direction; or with both exchanged.
+inline float burley_factor(float retro, float dim, float view, float cosine, float beta) {
   // l·v = 2 (n·v)(n·l) − l·m, (l·h)² = (1 + l·v)/2
   const float half2 = std::min(1.0f, std::max(0.0f, 0.5f + view * cosine - 0.5f * beta));
-  const float k = p.retro * half2 - p.dim;
+  const float k = retro * half2 - dim;
   return (1.0f + k * burley_edge(cosine)) * (1.0f + k * burley_edge(view));
+}
+inline float burley_factor(const SurfacePoint& p, float cosine, float beta) {
+  return burley_factor(p.retro, p.dim, dot(p.normal, p.mirror), cosine, beta);
 }
 
 // Its mean over the light's projected solid angle, for a viewer at `view` to the normal: over the azimuth in closed form,

@@ -25,11 +25,15 @@ inline float groove_edge(float cosine) {
   return m * (0.19812198f + m * (1.70644758f + m * (-1.15241865f + m * 0.24784909f)));
 }
 
-// What it multiplies Lambert's part by, for a light at `cosine` to the normal and `beta` to the mirror direction.
-inline float oren_nayar_factor(const SurfacePoint& p, float cosine, float beta) {
-  const float view = dot(p.normal, p.mirror), s = view * cosine - beta;  // l·v = 2 (n·v)(n·l) − l·m
+// What it multiplies Lambert's part by, for a viewer at `view` to the normal and a light at `cosine` to it and at `beta` to
+// the viewer's mirror direction; or with both exchanged.
+inline float oren_nayar_factor(float slope, float again, float view, float cosine, float beta) {
+  const float s = view * cosine - beta;  // l·v = 2 (n·v)(n·l) − l·m
   const float t = s > 0.0f ? std::min(1.0f, s) / std::max(1e-4f, std::max(cosine, view)) : s;
-  return std::max(0.0f, 1.0f + p.slope * t + p.again * (1.0f - groove_edge(cosine)));
+  return std::max(0.0f, 1.0f + slope * t + again * (1.0f - groove_edge(cosine)));
+}
+inline float oren_nayar_factor(const SurfacePoint& p, float cosine, float beta) {
+  return oren_nayar_factor(p.slope, p.again, dot(p.normal, p.mirror), cosine, beta);
 }
 
 // Its mean over the light's projected solid angle, for a viewer at `view`.

@@ -29,6 +29,13 @@ inline Rgb reflectance(const SurfacePoint& p, const Vec3f& to_light) {
   return f;
 }
 
+// Mean over the light's projected solid angle of what the diffuse lobe is over Lambert's.
+inline float mean_diffuse_factor(const SurfacePoint& p) {
+  const float view = dot(p.normal, p.mirror);
+  return mean_diffuse_falloff(p.falloff) * (p.burley() ? mean_burley_factor(p.retro, p.dim, view) : 1.0f) *
+         (p.grooved() ? mean_oren_nayar_factor(p.slope, p.again, view) : 1.0f);
+}
+
 // About the largest luminance of the glossy lobe over directions of at most `cosine` to the normal and `beta` to the
 // mirror direction; above 0 wherever the lobe is.
 inline float lobe_importance(const SurfacePoint& p, float cosine, float beta) {

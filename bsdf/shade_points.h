@@ -37,6 +37,8 @@ struct SurfacePoint {
 
   bool burley() const { return retro > 0.0f || dim > 0.0f; }
   bool grooved() const { return slope > 0.0f; }
+  // Whether its diffuse part is not Lambert's.
+  bool lobed() const { return burley() || grooved() || falloff > 0.0f; }
   bool bent() const { return smooth != Vec3f{}; }
   Lobes lobes() const {
     if (lobe != kCosineLobe || falloff > 0.0f || burley() || grooved() || bent()) return Lobes::all;

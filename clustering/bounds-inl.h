@@ -106,6 +106,15 @@ HWY_INLINE V3 GrownBySpheres(D d, const V3& half, const LightNode& node) {
   return {hn::Add(half.x, r), hn::Add(half.y, r), hn::Add(half.z, r)};
 }
 
+// The largest cosine of the node's lobed lights times their lobe, for directions of at most `cosine` to their normals: as
+// bsdf/oren_nayar.h and bsdf/burley.h bound it, with the light in the viewer's place, and nothing lost beneath gloss.
+HWY_INLINE V BoundOfLobed(D d, const LightNode& node, V cosine) {
+  const V c = hn::Max(hn::Zero(d), cosine);
+  const V edge = hn::MulAdd(hn::Set(d, node.largest_rise), BurleyEdge(d, c), hn::Set(d, 1.0f));
+  const V back = hn::Min(hn::Set(d, node.largest_groove), hn::Mul(hn::Set(d, node.steepest_groove), c));
+  return hn::MulAdd(hn::Mul(hn::Set(d, node.largest_even), edge), c, back);
+}
+
 // light_node_bounds of one kind of light. Departs from Walter et al.: luminance is bounded through each colour channel
 // on its own, so a blue light over a red wall costs nothing; and the cosine to the light's cone and to the surface are
 // bounded in their own frames each.
@@ -137,7 +146,7 @@ struct BoundsKernel {
         else
           geometry = hn::Div(
               one, hn::Max(hn::Max(Dist2(d, to_center, half), hn::Set(d, node.least_distance2)), hn::Set(d, 1e-30f)));
-        if constexpr (kKind == VplKind::oriented || kKind == VplKind::spot || kSpheres) {
+        if constexpr (kKind == VplKind::oriented || kKind == VplKind::lobed || kKind == VplKind::spot || kSpheres) {
           // From the lights to the point: the box turned around.
           const V x = hn::Neg(Dot(to_center, Set3(d, node.tangent))),
                   y = hn::Neg(Dot(to_center, Set3(d, node.bitangent)));
@@ -150,6 +159,8 @@ struct BoundsKernel {
             geometry = hn::IfThenElseZero(hn::Gt(WidenByCone(d, c, cos_half, sin_half), zero), geometry);
           } else if constexpr (kKind == VplKind::oriented) {
             geometry = hn::Mul(geometry, hn::Max(zero, WidenByCone(d, c, cos_half, sin_half)));
+          } else if constexpr (kKind == VplKind::lobed) {
+            geometry = hn::Mul(geometry, BoundOfLobed(d, node, WidenByCone(d, c, cos_half, sin_half)));
           } else {
             geometry = hn::IfThenElseZero(hn::Ge(hn::Add(c, hn::Set(d, 1e-5f)), cos_half), geometry);
           }

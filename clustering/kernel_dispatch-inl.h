@@ -33,6 +33,8 @@ HWY_INLINE auto RunKernel(VplKind kind, Lobes lobes, Args&&... args) {
       return RunForLobes<Kernel, VplKind::directional>(lobes, args...);
     case VplKind::spot:
       return RunForLobes<Kernel, VplKind::spot>(lobes, args...);
+    case VplKind::lobed:
+      return RunForLobes<Kernel, VplKind::lobed>(lobes, args...);
     case VplKind::sphere:
       break;
   }

@@ -50,6 +50,18 @@ HWY_INLINE V PlaceFacing(D d, const Vpl& light, const V3& position, V3& place) {
   return hn::Sqrt(d2);
 }
 
+// What a lobed light's intensity is multiplied by towards `to_light`, from each point at `cosine` to its normal.
+HWY_INLINE V LobeFactor(D d, const Vpl& light, const V3& to_light, V cosine) {
+  const V beta = hn::Neg(Dot(Set3(d, light.mirror()), to_light)), view = hn::Set(d, dot(light.normal, light.mirror()));
+  V factor = DiffuseFalloff(d, hn::Set(d, light.falloff), cosine);
+  if (light.slope() > 0.0f)
+    factor =
+        hn::Mul(factor, OrenNayarFactor(d, hn::Set(d, light.slope()), hn::Set(d, light.again), view, cosine, beta));
+  if (light.burley())
+    factor = hn::Mul(factor, BurleyFactor(d, hn::Set(d, light.retro), hn::Set(d, light.dim), view, cosine, beta));
+  return factor;
+}
+
 // Both cosines, the light's profile and the clamped squared distance, at points of `position` and `normal`; `to_light`:
 // unit. [thesis Eq. 1.1]
 template <VplKind kKind>
@@ -72,6 +84,9 @@ HWY_INLINE V Geometry(D d, const Vpl& light, Falloff falloff, const V3& position
     geometry = hn::Div(hn::Set(d, 1.0f), hn::Max(dist2, hn::Set(d, light.clamp2)));
     if constexpr (kKind == VplKind::oriented) {
       geometry = hn::Mul(geometry, hn::Max(zero, hn::Neg(Dot(light_normal, to_light))));
+    } else if constexpr (kKind == VplKind::lobed) {
+      const V cosine = hn::Max(zero, hn::Neg(Dot(light_normal, to_light)));
+      geometry = hn::Mul(geometry, hn::Mul(cosine, LobeFactor(d, light, to_light, cosine)));
     } else if constexpr (kKind == VplKind::spot) {
       geometry = hn::Mul(geometry, SpotFalloff(d, light, falloff, light_normal, to_light));
       if (light.facing) geometry = hn::Mul(geometry, hn::Mul(to_centre, inverse));  // the cosine at the disk

@@ -60,7 +60,12 @@ struct LightKernel {
       } else {
         constexpr VplKind kShape = kScatter ? VplKind::omni : kKind;
         geometry = Geometry<kShape>(d, light, falloff, position, normal, to_light);
-        if constexpr (kScatter) geometry = hn::Mul(geometry, MeanCosine(d, light.normal, *scatter, to_light));
+        if constexpr (kScatter) {
+          const V cosine = MeanCosine(d, light.normal, *scatter, to_light);
+          geometry = hn::Mul(geometry, cosine);
+          if constexpr (kKind == VplKind::lobed)
+            geometry = hn::Mul(geometry, LobeFactor(d, light, to_light, hn::Min(cosine, hn::Set(d, 1.0f))));
+        }
         reached = hn::And(hn::Gt(geometry, zero), inside);
         if (hn::AllFalse(d, reached)) continue;
         f = Reflectance<kLobes>(d, points, p, normal, to_light);
@@ -95,6 +100,9 @@ size_t LightPoints(const Vpl& light, const Rgb& intensity, Falloff falloff, cons
   if (light.kind == VplKind::sphere)
     return RunForLobes<LightKernel<true>, VplKind::sphere>(lobes, light, intensity, falloff, points, first, count, lit,
                                                            wanted, scatter);
+  if (light.kind == VplKind::lobed)
+    return RunForLobes<LightKernel<true>, VplKind::lobed>(lobes, light, intensity, falloff, points, first, count, lit,
+                                                          wanted, scatter);
   return RunForLobes<LightKernel<true>, VplKind::oriented>(lobes, light, intensity, falloff, points, first, count, lit,
                                                            wanted, scatter);
 }
@@ -122,6 +130,14 @@ void light_points(const Vpl& light, const Rgb& intensity, Falloff falloff, const
   lit.count = HWY_DYNAMIC_DISPATCH(LightPoints)(light, intensity, falloff, points, first, count, lit, lanes, scatter);
 }
 
+// Scalar counterpart of LobeFactor.
+static float lobe_factor(const Vpl& light, const Vec3f& to_light, float cosine) {
+  const float view = dot(light.normal, light.mirror()), beta = -dot(light.mirror(), to_light);
+  return diffuse_falloff(light.falloff, cosine) *
+         (light.slope() > 0.0f ? oren_nayar_factor(light.slope(), light.again, view, cosine, beta) : 1.0f) *
+         (light.burley() ? burley_factor(light.retro, light.dim, view, cosine, beta) : 1.0f);
+}
+
 Rgb light_point(const Vpl& light, const Rgb& intensity, Falloff falloff, const SurfacePoint& point) {
   if (light.kind == VplKind::sphere) return HWY_DYNAMIC_DISPATCH(SphereAt)(light, point) * intensity;
   Vec3f to_light = -light.normal;
@@ -132,7 +148,8 @@ Rgb light_point(const Vpl& light, const Rgb& intensity, Falloff falloff, const S
     to_light = v / std::sqrt(dist2);
     geometry = 1.0f / std::max(dist2, light.clamp2);
     const float cosine = -dot(light.normal, to_light);
-    if (light.kind == VplKind::oriented) geometry *= std::max(0.0f, cosine);
+    if (light.kind == VplKind::oriented || light.kind == VplKind::lobed) geometry *= std::max(0.0f, cosine);
+    if (light.kind == VplKind::lobed && cosine > 0.0f) geometry *= lobe_factor(light, to_light, cosine);
     if (light.kind == VplKind::spot) geometry *= falloff.of_spot(light, -to_light);
     if (light.facing) geometry *= length(light.position - light.from_centre - point.position) / std::sqrt(dist2);
   }

@@ -3,6 +3,7 @@
 #include <map>
 #include <numeric>
 
+#include "bsdf/burley.h"
 #include "clustering/light_policy.h"
 #include "core/cone.h"
 #include "core/rng.h"
@@ -17,6 +18,7 @@ struct Cluster {
   Rgb intensity{};
   float widest_spot = 1.0f;  // least cosine of the spots' own opening
   float least_distance2 = 0.0f, largest_radius = 0.0f;
+  float largest_even = 0.0f, largest_rise = 0.0f, largest_groove = 0.0f, steepest_groove = 0.0f;
 };
 
 Cluster merge(const Cluster& a, const Cluster& b) {
@@ -25,7 +27,20 @@ Cluster merge(const Cluster& a, const Cluster& b) {
           a.intensity + b.intensity,
           std::min(a.widest_spot, b.widest_spot),
           std::min(a.least_distance2, b.least_distance2),
-          std::max(a.largest_radius, b.largest_radius)};
+          std::max(a.largest_radius, b.largest_radius),
+          std::max(a.largest_even, b.largest_even),
+          std::max(a.largest_rise, b.largest_rise),
+          std::max(a.largest_groove, b.largest_groove),
+          std::max(a.steepest_groove, b.steepest_groove)};
+}
+
+// With slack for rounding.
+void add_lobe(const Vpl& v, Cluster& c) {
+  const float cosine = std::min(1.0f, std::max(0.0f, dot(v.normal, v.mirror())));
+  const float rise = 1.0001f * std::max(0.0f, v.retro - v.dim), of_view = 1.0f + rise * burley_edge(cosine);
+  const float groove = v.slope() * 1.0001f * std::sqrt(std::max(1e-6f, 1.0f - cosine * cosine)) * of_view;
+  c.largest_even = (1.0f + v.again) * of_view, c.largest_rise = rise;
+  c.largest_groove = groove * (1.0f + rise), c.steepest_groove = c.largest_groove / std::max(1e-4f, cosine);
 }
 
 // Splits in the middle of the longest axis. Ids as in agglomerate.h: leaves first, children before parents.
@@ -107,6 +122,8 @@ LightNode make_node(const Cluster& c, VplKind kind) {
   n.kind = kind;
   n.intensity = c.intensity;
   n.least_distance2 = c.least_distance2, n.largest_radius = c.largest_radius;
+  n.largest_even = c.largest_even, n.largest_rise = c.largest_rise, n.largest_groove = c.largest_groove,
+  n.steepest_groove = c.steepest_groove;
   if (kind != VplKind::directional)
     n.center = c.positions.center(), n.half = max(c.positions.hi - n.center, n.center - c.positions.lo);
   if (kind != VplKind::omni) {
@@ -164,6 +181,7 @@ void LightTree::add_kind(const std::vector<Vpl>& lights, const std::vector<uint3
     c.intensity = v.intensity;
     c.least_distance2 = v.clamp2;
     if (v.kind == VplKind::sphere) c.largest_radius = v.radius(), c.least_distance2 = v.radius() * v.radius();
+    if (v.kind == VplKind::lobed) add_lobe(v, c);
     // The profile of a narrowed area light ends where its cosine does.
     if (v.kind == VplKind::spot)
       c.widest_spot = v.profile == 0 && v.spot_cosine > 0.0f ? std::max(0.0f, v.cos_outer()) : v.cos_outer();

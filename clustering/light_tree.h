@@ -26,6 +26,9 @@ struct LightNode {
   VplKind kind = VplKind::omni;
   float least_distance2 = 0.0f;  // below which none of its lights comes nearer, squared; spheres: least radius²
   float largest_radius = 0.0f;   // spheres alone
+  // Lobed lights: of their lobes over Lambert's the part that no cosine decides; what Burley's has more towards the horizon; and what is
+  // Oren and Nayar's more, times the cosine, and over it.
+  float largest_even = 0.0f, largest_rise = 0.0f, largest_groove = 0.0f, steepest_groove = 0.0f;
 
   bool leaf() const { return first_child == kNoNode; }
 };

@@ -70,7 +70,8 @@ struct PairKernel {
           geometry = hn::Div(
               one, hn::Max(hn::Max(Dist2(d, to_center, half), hn::Set(d, node.least_distance2)), hn::Set(d, 1e-30f)));
         }
-        if constexpr (kKind == VplKind::oriented || kKind == VplKind::spot || kKind == VplKind::sphere) {
+        if constexpr (kKind == VplKind::oriented || kKind == VplKind::lobed || kKind == VplKind::spot ||
+                      kKind == VplKind::sphere) {
           // From the lights to the points: the box turned around.
           const V3 tangent = Set3(d, node.tangent), bitangent = Set3(d, node.bitangent);
           V3 frame_half = Set3(d, node.frame_half);
@@ -89,6 +90,8 @@ struct PairKernel {
             geometry = hn::IfThenElseZero(hn::Gt(WidenByCone(d, c, cos_half, sin_half), zero), geometry);
           } else if constexpr (kKind == VplKind::oriented) {
             geometry = hn::Mul(geometry, hn::Max(zero, WidenByCone(d, c, cos_half, sin_half)));
+          } else if constexpr (kKind == VplKind::lobed) {
+            geometry = hn::Mul(geometry, BoundOfLobed(d, node, WidenByCone(d, c, cos_half, sin_half)));
           } else {
             geometry = hn::IfThenElseZero(hn::Ge(hn::Add(c, hn::Set(d, 1e-5f)), cos_half), geometry);
           }

@@ -218,7 +218,7 @@ class StochasticLightcuts final : public Integrator {
     float reflected = luminance(point.diffuse);
     if (point.lobes() != Lobes::none) reflected += lobe_importance(point, cosine, best_cosine(point.mirror));
     float emitted = 1.0f;
-    if ((node.kind == VplKind::oriented || node.kind == VplKind::sphere) && distance > radius) {
+    if (faces_one_side(node.kind) && distance > radius) {
       const float c = -dot(node.axis, v) / distance;
       const float wide =
           c >= node.cos_half ? 1.0f : c * node.cos_half + std::sqrt(std::max(0.0f, 1.0f - c * c)) * node.sin_half;

@@ -30,7 +30,7 @@ struct Record {
 };
 constexpr size_t kHeaderSize[] = {offsetof(Header, emitter_samples), sizeof(Header)};
 constexpr size_t kRecordSize[] = {offsetof(Record, origin), sizeof(Record)};
-static_assert(kHeaderSize[0] == 32 && kHeaderSize[1] == 40 && kRecordSize[0] == 64 && kRecordSize[1] == 76);
+static_assert(kHeaderSize[0] == 32 && kHeaderSize[1] == 40 && kRecordSize[0] == 64 && kRecordSize[1] == 112);
 
 struct PeerRecord {
   float position[3], minus_normal[3], intensity[3];

@@ -56,6 +56,13 @@ float scattered_by_shading_normal(const SurfaceInteraction& at, const ScatterSam
   return up < kMostTilted * down ? up / down : kMostTilted;
 }
 
+// Of the surface beneath, for light that comes along `direction`; by the geometric normal, as its virtual light leaves.
+DiffuseLobe diffuse_lobe_of(const SurfaceInteraction& at, const Vec3f& direction) {
+  const SurfacePoint& p = at.bsdf.layers()[0];
+  if (!p.lobed()) return {};
+  return {reflect(-direction, at.side()), p.slope, p.again, p.retro, p.dim, p.falloff, mean_diffuse_factor(p)};
+}
+
 // Follows paths [first, last) in step, so that rays are traced in batches.
 LightPaths trace_paths(const Scene& scene, const LightSampler& emitters, const VplOptions& options,
                        const CameraImportance* importance, uint64_t first, uint64_t last) {
@@ -109,7 +116,7 @@ LightPaths trace_paths(const Scene& scene, const LightSampler& emitters, const V
       light.position = at.position, light.kind = VplKind::oriented, light.normal = at.side();
       light.offset = at.offset;
       light.group = path.group;
-      const auto leave = [&](const Rgb& intensity) {
+      const auto leave = [&](const Rgb& intensity, const DiffuseLobe& lobe) {
         if (!(max_component(intensity) > 0.0f) || !is_finite(intensity)) return;
         light.intensity = intensity;
         if (importance != nullptr) {
@@ -117,15 +124,15 @@ LightPaths trace_paths(const Scene& scene, const LightSampler& emitters, const V
           if (!(path.rng.next_float() < keep)) return;
           light.intensity *= 1.0f / keep;
         }
-        vpls.push_back({ids[i], path.emitter, light});
+        vpls.push_back({ids[i], path.emitter, light, lobe});
       };
       if (!path.first() || path.reach.lights(kDiffuseRay)) {
         const Rgb received = path.flux * (lit * lit_by_shading_normal(at));
         if (path.thrown && max_component(at.bsdf.even_color()) > 0.0f)
           found.glints.push_back({at.position, path.origin, luminance(received)});
-        leave(at.bsdf.lambertian_intensity(received));
+        leave(at.bsdf.lambertian_intensity(received), diffuse_lobe_of(at, path.direction));
         light.normal = -light.normal;
-        leave(at.bsdf.passed_intensity(received));
+        leave(at.bsdf.passed_intensity(received), {});
       }
       const auto next = at.bsdf.scatter(path.rng);
       if (!next) continue;

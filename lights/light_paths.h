@@ -15,6 +15,7 @@ struct PathVpl {
   uint64_t path;
   uint32_t emitter;  // that the path starts at, as LightSampler counts all
   Vpl vpl;
+  DiffuseLobe lobe;
 };
 
 struct LightPaths {

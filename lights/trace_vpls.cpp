@@ -34,9 +34,11 @@ void trace_indirect(const Scene& scene, const LightSampler& emitters, const VplO
   const float normalise = 1.0f / static_cast<float>(paths);
   LightPaths traced = trace_light_paths(scene, emitters, options, importance, 0, paths, progress);
   set.glints = std::move(traced.glints);
+  const bool lobed = scene.may_be_lobed();
   for (const PathVpl& v : traced.lights) {
     set.lights.push_back(v.vpl);
     set.lights.back().intensity *= normalise;
+    if (lobed) set.lobes.push_back(v.lobe);
   }
   set.light_paths = paths;
 }
@@ -60,6 +62,14 @@ float offset_on_surface(const Scene& scene, const Vec3f& position, const Vec3f& 
   ray.ray.org = position + normal * height, ray.ray.dir = -normal, ray.ray.tfar = 2.0f * height;
   scene.accel().intersect({&ray, 1});
   return ray.hit.geom == kNoId ? least : scene.surface(ray).offset;
+}
+
+void make_lobed(const DiffuseLobe& lobe, Vpl& light) {
+  if (!lobe.any() || light.kind != VplKind::oriented) return;
+  light.kind = VplKind::lobed, light.intensity *= 1.0f / lobe.mean;
+  light.edge_or_radius = lobe.slope, light.again = lobe.again, light.retro = lobe.retro, light.dim = lobe.dim;
+  light.falloff = lobe.falloff;
+  light.blend_cosine = lobe.mirror.x, light.spot_cosine = lobe.mirror.y, light.spread_tan = lobe.mirror.z;
 }
 
 }  // namespace
@@ -127,7 +137,7 @@ VplSet trace_vpls(const Scene& scene, const LightSampler& emitters, const VplOpt
 
 VplSet off_surfaces(const VplSet& set, const Scene& scene) {
   VplSet moved = set;
-  moved.glints.clear();
+  moved.glints.clear(), moved.lobes.clear();
   const size_t direct = set.light_paths > 0 ? set.direct : set.lights.size();
   const uint32_t scattered = scene.scattered_ray_mask();
   parallel_chunks(moved.lights.size(), 4096, [&](size_t begin, size_t end) {
@@ -137,6 +147,7 @@ VplSet off_surfaces(const VplSet& set, const Scene& scene) {
       if (v.kind != VplKind::oriented && v.kind != VplKind::sphere) continue;
       if (!(v.offset > 0.0f)) v.offset = offset_on_surface(scene, v.position, v.normal);
       v.position += v.normal * v.offset;
+      if (i >= set.direct && i - set.direct < set.lobes.size()) make_lobed(set.lobes[i - set.direct], v);
     }
   });
   return moved;

@@ -35,9 +35,9 @@ VplSet trace_vpls(const Scene& scene, const LightSampler& emitters, const VplOpt
                   const CameraImportance* importance, Progress& progress);
 
 // The same lights with oriented ones and spheres moved off their surface by their offset, so that shadow rays can start
-// there. Traced lights and a host's own lie on their surfaces; those whose offset is not known have the one of the
-// triangle that they lie on. Lights of light paths ask for what stops bounced light (Vpl::ray_mask), where any path is
-// known. Without glints. Throws Error(cancelled).
+// there, and oriented ones of surfaces that are not Lambert's made lobed. Traced lights and a host's own lie on their surfaces;
+// those whose offset is not known have the one of the triangle that they lie on. Lights of light paths ask for what stops
+// bounced light (Vpl::ray_mask), where any path is known. Without glints and lobes. Throws Error(cancelled).
 VplSet off_surfaces(const VplSet& set, const Scene& scene);
 
 }  // namespace lumicut

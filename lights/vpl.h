@@ -11,18 +11,25 @@
 
 namespace lumicut {
 
-enum class VplKind : uint32_t { omni = 0, oriented = 1, directional = 2, spot = 3, sphere = 4 };
-inline constexpr int kVplKinds = 5;
+enum class VplKind : uint32_t { omni = 0, oriented = 1, directional = 2, spot = 3, sphere = 4, lobed = 5 };
+inline constexpr int kVplKinds = 6;
 
-// A sphere is an oriented light spread over a ball. [Hašan et al. 2009:
-// virtual spherical lights]
+// Whether it shines by the cosine to its normal.
+inline constexpr bool faces_one_side(VplKind kind) {
+  return kind == VplKind::oriented || kind == VplKind::sphere || kind == VplKind::lobed;
+}
+
+// A sphere is an oriented light spread over a ball. [Hašan et al. 2009: virtual spherical lights]
+// A lobed light is an oriented one that shines by its surface's own diffuse lobe, which is not Lambert's: dimmer towards the
+// horizon beneath gloss, brighter back to where its light comes from on rough surfaces. Made of oriented ones, within the
+// library alone (off_surfaces).
 struct Vpl {
   Vec3f position{};  // directional: unused
   VplKind kind = VplKind::omni;
   Vec3f normal{};  // unit; directional: the way light travels; spot: axis; omni: 0
   uint32_t group = 0;
-  Rgb intensity{};                                // W/sr along the normal; directional: irradiance W/m²
-  float edge_or_radius = 0.0f;                    // spot: cos_outer(); sphere: radius()
+  Rgb intensity{};              // W/sr along the normal; directional: irradiance W/m²; lobed: before its lobe
+  float edge_or_radius = 0.0f;  // spot: cos_outer(); sphere: radius(); lobed: slope()
   float blend_cosine = 0.0f, spot_cosine = 0.0f;  // spot
   float spread_tan = 0.0f;  // spot: narrowed area lights fall off with max(0, 1 − spread_tan·tanθ)
   // Spot: id of a LightProfile [scene/light_profile.h] in place of the falloff above; then blend_cosine, spot_cosine and
@@ -39,9 +46,12 @@ struct Vpl {
   // Spot: one place of a lamp with a radius. [lights/soft_lamp.h]
   Vec3f from_centre{};
   float lamp_radius = 0.0f;  // 0: a point
+  // Lobed: its lobe, beside slope(). [bsdf/oren_nayar.h; bsdf/burley.h; bsdf/lambert.h]
+  float again = 0.0f, retro = 0.0f, dim = 0.0f, falloff = 0.0f;
   uint32_t facing = 0;  // 1: its disk faces what it lights; else a sphere. (No bool: lights are compared by bytes.)
   LUMICUT_FIELDS(Vpl, position, kind, normal, group, intensity, edge_or_radius, blend_cosine, spot_cosine, spread_tan,
-                 profile, ray_mask, seen_by, receivers, offset, cell, clamp2, from_centre, lamp_radius, facing)
+                 profile, ray_mask, seen_by, receivers, offset, cell, clamp2, from_centre, lamp_radius, again, retro,
+                 dim, falloff, facing)
 
   // Spot: the cosine at which it has fallen to 0.
   float cos_outer() const { return edge_or_radius; }
@@ -50,6 +60,21 @@ struct Vpl {
   float radius() const { return edge_or_radius; }
   float& radius() { return edge_or_radius; }
   Vec3f tangent() const { return {blend_cosine, spot_cosine, spread_tan}; }
+  // Lobed: 0 to 1; and the unit direction that a mirror at its place would throw its light to.
+  float slope() const { return edge_or_radius; }
+  Vec3f mirror() const { return tangent(); }
+  bool burley() const { return retro > 0.0f || dim > 0.0f; }
+};
+
+// What makes an oriented light a lobed one: its surface's diffuse lobe, for the light that comes to it.
+struct DiffuseLobe {
+  Vec3f mirror{};
+  float slope = 0.0f, again = 0.0f, retro = 0.0f, dim = 0.0f, falloff = 0.0f;
+  float mean = 1.0f;  // of the lobe over Lambert's: the oriented light has so many times the lobed one's intensity
+  LUMICUT_FIELDS(DiffuseLobe, mirror, slope, again, retro, dim, falloff, mean)
+
+  // Whether it is not Lambert's.
+  bool any() const { return slope > 0.0f || retro > 0.0f || dim > 0.0f || falloff > 0.0f; }
 };
 
 // Where a light path met what reflects evenly, after gloss, a mirror or glass threw it there, and from where.
@@ -66,8 +91,9 @@ struct VplSet {
   uint64_t first_of_sky = 0, of_sky = 0;  // those of them that stand for the environment
   uint64_t extended = 0;                  // samples drawn on emitters with extent for those; some give no light
   LightProfiles profiles;                 // those that lights name
+  std::vector<DiffuseLobe> lobes;         // of each light behind the direct ones, if any surface may have one
   std::vector<Glint> glints;              // of light paths, not divided by their number
-  LUMICUT_FIELDS(VplSet, lights, light_paths, direct, first_of_sky, of_sky, extended, profiles, glints)
+  LUMICUT_FIELDS(VplSet, lights, light_paths, direct, first_of_sky, of_sky, extended, profiles, lobes, glints)
 };
 
 }  // namespace lumicut

@@ -15,7 +15,7 @@ namespace {
 
 constexpr char kMagic[8] = {'L', 'U', 'M', 'I', 'C', 'U', 'T', 'S'};
 constexpr char kIntegrator[] = "integrator";
-constexpr uint32_t kVersion = 5, kByteOrder = 0x01020304u;
+constexpr uint32_t kVersion = 6, kByteOrder = 0x01020304u;
 // Of a light that stands for a place of a lamp, what no host needs to know.
 struct Lamp {
   Vec3f from_centre;

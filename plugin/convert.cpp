@@ -528,6 +528,12 @@ Vpl to_vpl(const lumicut_vpl& in, uint64_t i, const LightProfiles& known, LightP
   return vpl;
 }
 
+void check_unit(const FieldValidator& c, const char* name, const float (&v)[3]) {
+  c.finite(name, v);
+  const double l = length(vec_double(v));
+  if (std::abs(l - 1.0) > 1e-2) c.fail(name, "has length " + number_text(l) + ", not 1");
+}
+
 void take_origin(const lumicut_vpl_origin& in, uint64_t i, Vpl& vpl) {
   const FieldValidator c("lumicut_vpl_origin", i);
   c.integer("source", in.source, LUMICUT_SOURCE_PATH, LUMICUT_SOURCE_AREA);
@@ -538,6 +544,31 @@ void take_origin(const lumicut_vpl_origin& in, uint64_t i, Vpl& vpl) {
   if (in.source != LUMICUT_SOURCE_AREA && in.area > 0.0f)
     c.fail("area", number_text(in.area) + " is not 0, but the source is not LUMICUT_SOURCE_AREA");
   vpl.offset = in.offset, vpl.cell = in.area;
+}
+
+void give_lobe(const DiffuseLobe& lobe, lumicut_vpl_origin& out) {
+  if (!lobe.any()) return;
+  for (int k = 0; k < 3; ++k) out.mirror[k] = lobe.mirror[k];
+  out.slope = lobe.slope, out.again = lobe.again, out.retro = lobe.retro, out.dim = lobe.dim,
+  out.falloff = lobe.falloff;
+  out.lobe_mean = lobe.mean;
+}
+
+DiffuseLobe take_lobe(const lumicut_vpl_origin& in, uint64_t i, const Vpl& vpl) {
+  const FieldValidator c("lumicut_vpl_origin", i);
+  c.range("slope", in.slope, 0.0f, 1.0f);
+  c.range("again", in.again, 0.0f, 1.0f);
+  c.range("retro", in.retro, 0.0f, 2.0f);
+  c.range("dim", in.dim, 0.0f, 0.5f);
+  c.range("falloff", in.falloff, 0.0f, 1.0f);
+  DiffuseLobe lobe{{}, in.slope, in.again, in.retro, in.dim, in.falloff, in.lobe_mean};
+  if (!lobe.any()) return {};
+  if (in.source != LUMICUT_SOURCE_PATH || vpl.kind != VplKind::oriented)
+    c.fail("slope", "with retro, dim and falloff is a lobe, but the light is no oriented one of LUMICUT_SOURCE_PATH");
+  check_unit(c, "mirror", in.mirror);
+  c.range("lobe_mean", in.lobe_mean, 0.01f, 100.0f);
+  lobe.mirror = vec(in.mirror);
+  return lobe;
 }
 
 }  // namespace
@@ -556,6 +587,7 @@ HostVpls from_vpls(const VplSet& set) {
     const bool area = v.cell > 0.0f;
     out.origins[i].source = i >= set.direct ? LUMICUT_SOURCE_PATH : area ? LUMICUT_SOURCE_AREA : LUMICUT_SOURCE_POINT;
     out.origins[i].offset = v.offset, out.origins[i].area = v.cell;
+    if (i >= set.direct && i - set.direct < set.lobes.size()) give_lobe(set.lobes[i - set.direct], out.origins[i]);
   }
   out.light_paths = set.light_paths, out.emitter_samples = set.extended;
   return out;
@@ -577,6 +609,8 @@ VplSet to_vpls(const lumicut_vpl_set& in, const LightProfiles& known) {
       set.lights.push_back(to_vpl(in.lights[i], i, known, set.profiles));
       if (in.origins == nullptr) continue;
       take_origin(in.origins[i], i, set.lights.back());
+      const DiffuseLobe lobe = take_lobe(in.origins[i], i, set.lights.back());
+      if (!first) set.lobes.push_back(lobe);
       if (in.origins[i].source == LUMICUT_SOURCE_AREA) ++areas;
     }
     if (first) set.direct = set.lights.size();
@@ -589,16 +623,10 @@ VplSet to_vpls(const lumicut_vpl_set& in, const LightProfiles& known) {
   // Where origins are known, so is that lights of one path follow each other, however many paths there were.
   set.light_paths = in.origins != nullptr ? std::max<uint64_t>(1, in.light_paths) : 0;
   set.extended = in.emitter_samples;
+  if (std::none_of(set.lobes.begin(), set.lobes.end(), [](const DiffuseLobe& lobe) { return lobe.any(); }))
+    set.lobes.clear();
   return set;
 }
-
-namespace {
-void check_unit(const FieldValidator& c, const char* name, const float (&v)[3]) {
-  c.finite(name, v);
-  const double l = length(vec_double(v));
-  if (std::abs(l - 1.0) > 1e-2) c.fail(name, "has length " + number_text(l) + ", not 1");
-}
-}  // namespace
 
 void check_points(const Scene& scene, const lumicut_point* points, uint64_t count) {
   if (count > 0 && points == nullptr) fail_argument("lumicut_points: NULL, but count is " + number_text(count));

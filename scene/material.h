@@ -60,6 +60,8 @@ struct Material {
     return lobe == LobeModel::ggx && (roughness * roughness < kLeastAlpha || roughness_texture >= 0 ||
                                       transmission > 0.0f || smooth_coat(coat, coat_alpha()));
   }
+  // Whether its diffuse part may not be Lambert's.
+  bool may_be_lobed() const { return oren_nayar || lobe == LobeModel::ggx; }
   bool cutout() const { return opacity < 1.0f || opacity_texture >= 0; }
 };
 

@@ -607,6 +607,10 @@ BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv, const Surface
   return p;
 }
 
+bool Scene::may_be_lobed() const {
+  return std::any_of(materials_.begin(), materials_.end(), [](const Material& m) { return m.may_be_lobed(); });
+}
+
 bool Scene::may_be_specular() const {
   return std::any_of(materials_.begin(), materials_.end(), [](const Material& m) { return m.may_be_specular(); });
 }

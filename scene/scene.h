@@ -126,6 +126,8 @@ class Scene final : private HitFilter {
   size_t most_layers() const { return most_layers_; }
   // Whether any material may have a specular lobe.
   bool may_be_specular() const;
+  // Whether any surface's diffuse lobe may not be Lambert's.
+  bool may_be_lobed() const;
   // Of a rectangle or disk at a place on it: its value, and its texture there.
   Rgb light_value(const Light& light, const Vec3f& at) const;
   // Radiance emitted by a surface towards `to_viewer`.

@@ -238,7 +238,8 @@ class ChannelInfo(Descriptor):
 
 
 class VplOrigin(Structure):
-    _fields_ = [("source", c_uint32), ("offset", c_float), ("area", c_float)]
+    _fields_ = [("source", c_uint32), ("offset", c_float), ("area", c_float), ("mirror", c_float * 3), ("slope", c_float),
+                ("again", c_float), ("retro", c_float), ("dim", c_float), ("falloff", c_float), ("lobe_mean", c_float)]
 
 
 class VplSet(Descriptor):

@@ -44,7 +44,7 @@ IlluminationCut::Representative IlluminationCut::representative(uint32_t index) 
   if (node.kind == VplKind::spot) return r;
   r.shining.position = mean.place;
   if (node.kind == VplKind::sphere) r.shining.radius() = mean.radius;
-  if (node.kind == VplKind::oriented || node.kind == VplKind::sphere)
+  if (faces_one_side(node.kind))  // lobed lights by the lobe of the central one
     r.shining.normal = mean.direction, r.scatter = &mean.scatter;
   return r;
 }
@@ -58,7 +58,7 @@ float IlluminationCut::gives(uint32_t index, const Vec3f& position, const Vec3f&
   const Vec3f v = mean.place - position;
   const float dist2 = std::max(length2(v), 1e-30f);
   const Vec3f to_light = v / std::sqrt(dist2);
-  const bool faces = node.kind == VplKind::oriented || node.kind == VplKind::sphere;
+  const bool faces = faces_one_side(node.kind);
   const float cosine = faces ? mean_cosine(mean.direction, mean.scatter, to_light) : 1.0f;
   const float least2 = node.kind == VplKind::sphere ? mean.radius * mean.radius : node.least_distance2;
   return light * cosine * std::max(kHorizon, dot(normal, to_light)) / std::max(dist2, least2);

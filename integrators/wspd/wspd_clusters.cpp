@@ -11,6 +11,10 @@ namespace {
 float unlike2(const Vpl& a, const Vpl& b) {
   if (a.kind == VplKind::sphere && b.kind == VplKind::sphere && a.ray_mask == b.ray_mask)
     return length2(a.normal - b.normal);
+  if (a.kind == VplKind::lobed && b.kind == VplKind::lobed && a.ray_mask == b.ray_mask) {
+    const float by_mirror = 0.5f * (a.slope() + b.slope() + a.retro + b.retro);
+    return length2(a.normal - b.normal) + by_mirror * by_mirror * length2(a.mirror() - b.mirror());
+  }
   if (a.kind != b.kind || a.edge_or_radius != b.edge_or_radius || a.blend_cosine != b.blend_cosine ||
       a.spot_cosine != b.spot_cosine || a.spread_tan != b.spread_tan || a.ray_mask != b.ray_mask ||
       a.facing != b.facing)
@@ -54,6 +58,7 @@ float intensity_share(const Vpl& v, const Falloff& falloff, const Vec3f& directi
       return 1.0f;
     case VplKind::oriented:
     case VplKind::sphere:
+    case VplKind::lobed:
       return std::max(0.0f, c);
     case VplKind::spot:
       return falloff.of_spot(v, direction);

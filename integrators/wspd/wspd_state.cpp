@@ -92,7 +92,8 @@ void WspdTree::check(const LightProfiles& profiles) const {
     return static_cast<uint32_t>(v.kind) < kVplKinds && is_finite(v.position) && is_finite(v.normal) &&
            positive(v.intensity.x) && positive(v.intensity.y) && positive(v.intensity.z) &&
            std::isfinite(v.edge_or_radius) && std::isfinite(v.blend_cosine) && std::isfinite(v.spot_cosine) &&
-           std::isfinite(v.spread_tan) && (v.profile == 0 || profiles.find(v.profile) != nullptr);
+           std::isfinite(v.spread_tan) && std::isfinite(v.again) && std::isfinite(v.retro) && std::isfinite(v.dim) &&
+           std::isfinite(v.falloff) && (v.profile == 0 || profiles.find(v.profile) != nullptr);
   };
   require(is_finite(cube_.lower) && positive(cube_.side) && cube_.side > 0.0f, "bounds");
   for (const double s : cube_.shift) require(s >= 0.0 && s <= 1.0, "bounds");

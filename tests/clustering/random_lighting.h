@@ -66,12 +66,27 @@ inline const LightProfiles& random_profiles() {
   return all;
 }
 
+// A lobe of Oren and Nayar's, of Burley's, or of both at once, beneath gloss or not, for light from anywhere above the normal.
+inline void set_random_lobe(Rng& rng, Vpl& v) {
+  Vec3f mirror = random_direction(rng);
+  if (rng.next_below(4) == 0) mirror = normalize(mirror * 0.05f + Frame(v.normal).t);  // grazing
+  if (dot(mirror, v.normal) < 0) mirror = -mirror;
+  v.blend_cosine = mirror.x, v.spot_cosine = mirror.y, v.spread_tan = mirror.z;
+  if (rng.next_below(2) == 0) v.falloff = rng.next_float();
+  const uint32_t lobes = rng.next_below(3);
+  if (lobes != 0) v.edge_or_radius = rng.next_float(), v.again = 0.5f * rng.next_float();
+  if (lobes == 1) return;
+  const float share = rng.next_float();
+  v.retro = 2.0f * rng.next_float() * share, v.dim = 0.5f * share;
+}
+
 inline Vpl random_light(Rng& rng, VplKind kind, float half) {
   Vpl v;
   v.kind = kind;
   v.position = random_point(rng, half);
   v.normal = kind == VplKind::omni ? Vec3f{} : random_direction(rng);
   v.intensity = {rng.next_float(), rng.next_float(), rng.next_float()};
+  if (kind == VplKind::lobed) set_random_lobe(rng, v);
   if (kind == VplKind::sphere) v.radius() = std::pow(10.0f, 0.3f - 2.3f * rng.next_float());
   if (kind == VplKind::spot) {
     v.cos_outer() = 1.6f * rng.next_float() - 0.8f;
@@ -128,6 +143,7 @@ inline std::vector<Vpl> random_cluster(Rng& rng, VplKind kind, size_t n) {
       const Vec3f tangent = Frame(v.normal).t;
       v.blend_cosine = tangent.x, v.spot_cosine = tangent.y, v.spread_tan = tangent.z;
     }
+    if (kind == VplKind::lobed) set_random_lobe(rng, v);
     lights.push_back(v);
   }
   return lights;

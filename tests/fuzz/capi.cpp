@@ -509,6 +509,10 @@ class Session {
     lumicut_vpl_origin origin{};
     origin.source = in_.ConsumeIntegralInRange<uint32_t>(0, 2);
     origin.offset = 0.001f, origin.area = origin.source == LUMICUT_SOURCE_AREA ? 0.1f : 0.0f;
+    if (in_.ConsumeBool()) {
+      origin.slope = 0.5f, origin.again = 0.1f, origin.retro = 1, origin.dim = 0.5f;
+      origin.mirror[1] = -1, origin.lobe_mean = 1;
+    }
     const auto* origins = keep(changed(std::vector<lumicut_vpl_origin>(4, origin)));
     auto usual = make<lumicut_vpl_set>();
     usual.count = 1, usual.emitter_samples = 1;

@@ -17,6 +17,12 @@ lumicut_vpl oriented(float x) {
   return light;
 }
 
+lumicut_vpl_origin area_origin() {
+  lumicut_vpl_origin origin{};
+  origin.source = LUMICUT_SOURCE_AREA, origin.offset = 0.1f, origin.area = 2;
+  return origin;
+}
+
 std::string bytes_of(const auto& value) { return {reinterpret_cast<const char*>(&value), sizeof(value)}; }
 
 // Of version 1, whose records are 64 bytes.
@@ -26,7 +32,7 @@ std::string own_header(uint64_t count, uint32_t version = 1, uint32_t record = 6
 
 // Of version 2: light paths and samples of emitters, then records with their origins.
 std::string header2(uint64_t count, uint64_t emitter_samples = 0) {
-  return own_header(count, 2, 76) + bytes_of(emitter_samples);
+  return own_header(count, 2, 112) + bytes_of(emitter_samples);
 }
 
 template <typename T>
@@ -52,7 +58,15 @@ TEST(VplFile, LightsComeBackBitForBit) {
   const TemporaryFolder folder;
   api::VplSet set = hundred();
   for (uint32_t i = 0; i < 100; ++i)
-    set.origins.push_back({i % 3, 1e-4f * static_cast<float>(i), i % 3 == LUMICUT_SOURCE_AREA ? 0.3f : 0.0f});
+    set.origins.push_back({i % 3,
+                           1e-4f * static_cast<float>(i),
+                           i % 3 == LUMICUT_SOURCE_AREA ? 0.3f : 0.0f,
+                           {0, 0, 1},
+                           0.5f,
+                           0.1f,
+                           1,
+                           0.5f,
+                           0.9f});
   set.light_paths = 1234, set.emitter_samples = 40;
   write_vpls(folder / "a.vpl", set);
   const auto read = read_vpls(folder / "a.vpl");
@@ -60,7 +74,7 @@ TEST(VplFile, LightsComeBackBitForBit) {
   EXPECT_TRUE(same_bytes(read.origins, set.origins));
   EXPECT_EQ(read.light_paths, 1234u);
   EXPECT_EQ(read.emitter_samples, 40u);
-  EXPECT_EQ(std::filesystem::file_size(folder / "a.vpl"), 40u + 7600u);
+  EXPECT_EQ(std::filesystem::file_size(folder / "a.vpl"), 40u + 11200u);
   write_vpls(folder / "none.vpl", {});
   EXPECT_TRUE(read_vpls(folder / "none.vpl").lights.empty());
 }
@@ -102,8 +116,8 @@ TEST(VplFile, WrongLengthsAndVersionsAreNamed) {
   expect_in(error(own_header(0, 0)), {"version is 0"});
   expect_in(error(own_header(0, 3)), {"version is 3"});
   expect_in(error(own_header(0, 1, 60)), {"record size is 60"});
-  expect_in(error(own_header(0, 2, 64)), {"record size is 64", "76"});
-  expect_in(error(own_header(0, 2, 76)), {"ends within its header"});
+  expect_in(error(own_header(0, 2, 64)), {"record size is 64", "112"});
+  expect_in(error(own_header(0, 2, 112)), {"ends within its header"});
   expect_in(error(own_header(2) + bytes_of(oriented(1))), {"says 2 lights", "64 bytes"});
   expect_in(error(own_header(UINT64_MAX) + bytes_of(oriented(1))), {"18446744073709551615"});
   expect_in(error(own_header(1) + bytes_of(oriented(1)).substr(0, 40)), {"40 bytes"});
@@ -115,9 +129,9 @@ TEST(VplFile, RecordsWithOriginsAreCounted) {
   const auto error = [&](const std::string& bytes) {
     return error_of([&] { read_vpls(folder.write("bad.vpl", bytes)); });
   };
-  const std::string light = bytes_of(oriented(0)), origin = bytes_of(lumicut_vpl_origin{LUMICUT_SOURCE_AREA, 0.1f, 2});
+  const std::string light = bytes_of(oriented(0)), origin = bytes_of(area_origin());
   EXPECT_EQ(read_vpls(folder.write("good.vpl", header2(1, 1) + light + origin)).origins[0].area, 2);
-  expect_in(error(header2(2, 2) + light + origin), {"bad.vpl", "says 2 lights", "76 bytes"});
+  expect_in(error(header2(2, 2) + light + origin), {"bad.vpl", "says 2 lights", "112 bytes"});
   expect_in(error(header2(1, 1) + light + origin.substr(0, 8)), {"says 1 lights", "72 bytes"});
 }
 
@@ -127,8 +141,7 @@ TEST(VplFile, WrongValuesAreNamedWithRecordAndField) {
   const api::Device device(1);
   const api::Integrator integrator(device, "exhaustive");
   const auto error = [&](const lumicut_vpl& light, const lumicut_vpl_origin& origin) {
-    const std::string path = folder.write("bad.vpl", header2(2, 1) + bytes_of(oriented(0)) +
-                                                         bytes_of(lumicut_vpl_origin{LUMICUT_SOURCE_AREA, 0.1f, 2}) +
+    const std::string path = folder.write("bad.vpl", header2(2, 1) + bytes_of(oriented(0)) + bytes_of(area_origin()) +
                                                          bytes_of(light) + bytes_of(origin));
     return error_of([&] { upload_vpls(api::linked(), integrator.get(), read_vpls(path), path); });
   };

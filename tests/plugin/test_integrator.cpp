@@ -229,6 +229,7 @@ TEST(Integrators, LightsOfEveryKindOfEmitterTellWhereTheyComeFrom) {
   host.parameters["vpls"] = "400";
   host.frame.passes = 1, host.frame.flags = 0;
   host.materials[4].emission_texture = 2, host.materials[4].emission[0] = 30;
+  host.materials[0].flags |= LUMICUT_OREN_NAYAR, host.materials[0].roughness = 0.8f;
   std::fill_n(host.texels[1].begin(), host.texels[1].size() / 2, 0.0f);
   const api::Scene s = host.scene(device);
   for (const char* id : {"exhaustive", "lightcuts"}) {
@@ -243,6 +244,7 @@ TEST(Integrators, LightsOfEveryKindOfEmitterTellWhereTheyComeFrom) {
       EXPECT_EQ(o.area > 0, o.source == LUMICUT_SOURCE_AREA);
       EXPECT_EQ(o.offset > 0, set.lights[i].kind == LUMICUT_VPL_ORIENTED) << "of what lies on a surface";
     }
+    EXPECT_TRUE(std::any_of(set.origins.begin(), set.origins.end(), [](const auto& o) { return o.slope > 0; }));
     EXPECT_GT(of[LUMICUT_SOURCE_PATH], 100u);
     EXPECT_GT(of[LUMICUT_SOURCE_POINT], 1u) << "the lamp, and the environment";
     EXPECT_GT(of[LUMICUT_SOURCE_AREA], 10u);
@@ -297,7 +299,7 @@ TEST(Integrators, OriginsAreCheckedByNameAndValue) {
   api::VplSet good;
   good.lights.resize(3);
   good.origins.resize(3);
-  good.origins[1] = {LUMICUT_SOURCE_AREA, 0.1f, 2.0f};
+  good.origins[1].source = LUMICUT_SOURCE_AREA, good.origins[1].offset = 0.1f, good.origins[1].area = 2;
   good.emitter_samples = 1;
   i.set_vpls(good);
   const auto refused = [&](auto spoil, const char* text) {
@@ -319,6 +321,22 @@ TEST(Integrators, OriginsAreCheckedByNameAndValue) {
   refused([](auto& s) { s.origins[1].area = INFINITY; }, "lumicut_vpl_origin[1].area: inf");
   refused([](auto& s) { s.origins[1].area = 0; }, "lumicut_vpl_origin[1].area: is 0");
   refused([](auto& s) { s.origins[2].area = 3; }, "lumicut_vpl_origin[2].area: 3 is not 0");
+  refused([](auto& s) { s.origins[2].slope = 1.5f; }, "lumicut_vpl_origin[2].slope: 1.5");
+  refused([](auto& s) { s.origins[2].again = NAN; }, "lumicut_vpl_origin[2].again: nan");
+  refused([](auto& s) { s.origins[2].retro = 3; }, "lumicut_vpl_origin[2].retro: 3");
+  refused([](auto& s) { s.origins[2].dim = -1; }, "lumicut_vpl_origin[2].dim: -1");
+  refused([](auto& s) { s.origins[2].falloff = 1.5f; }, "lumicut_vpl_origin[2].falloff: 1.5");
+  refused([](auto& s) { s.origins[1].dim = 0.5f; },
+          "lumicut_vpl_origin[1].slope: with retro, dim and falloff is a lobe, but");
+  const auto rough = [](auto& s) {
+    s.lights[2].kind = LUMICUT_VPL_ORIENTED, s.lights[2].normal[2] = 1, s.origins[2].slope = 1;
+    s.origins[2].mirror[2] = 1, s.origins[2].lobe_mean = 1;
+  };
+  auto taken = good;
+  rough(taken);
+  i.set_vpls(taken);
+  refused([&](auto& s) { rough(s), s.origins[2].mirror[2] = 0.5f; }, "lumicut_vpl_origin[2].mirror: has length 0.5");
+  refused([&](auto& s) { rough(s), s.origins[2].lobe_mean = 0; }, "lumicut_vpl_origin[2].lobe_mean: 0");
   refused([](auto& s) { s.lights[2].intensity[0] = -1; }, "lumicut_vpl[2].intensity[0]: -1");
   refused([](auto& s) { s.emitter_samples = 0; }, "lumicut_vpl_set.emitter_samples: 0 is less than the 1 lights");
   refused([](auto& s) { s.origins.clear(); }, "lumicut_vpl_set.emitter_samples: is 1, but origins is NULL");

@@ -83,7 +83,7 @@ TEST(Identity, EveryFieldOfAMaterialCounts) { EXPECT_EQ(expect_every_field_count
 TEST(Identity, EveryFieldOfALightCounts) { EXPECT_EQ(expect_every_field_counts(Light{}), 32u); }
 TEST(Identity, EveryFieldOfAnEnvironmentCounts) { EXPECT_EQ(expect_every_field_counts(Environment{}), 18u); }
 TEST(Identity, EveryFieldOfACameraCounts) { EXPECT_EQ(expect_every_field_counts(Camera{}), 31u); }
-TEST(Identity, EveryFieldOfAVirtualLightCounts) { EXPECT_EQ(expect_every_field_counts(Vpl{}), 27u); }
+TEST(Identity, EveryFieldOfAVirtualLightCounts) { EXPECT_EQ(expect_every_field_counts(Vpl{}), 31u); }
 TEST(Identity, EveryFieldOfAFrameCounts) {
   EXPECT_EQ(expect_every_field_counts(FrameOptions{}), 17u);
   FrameOptions frame;
@@ -137,7 +137,7 @@ TEST(Identity, LightProfilesCountByTheirContent) {
   EXPECT_NE(hash(0.5f), hash_value(0, LightProfiles{}));
 }
 TEST(Identity, EveryFieldOfASetOfVirtualLightsCounts) {
-  EXPECT_EQ(expect_every_field_counts(VplSet{{Vpl{}, Vpl{}}, 3, 1, 0, 1, 1, {}, {}}), 35u);
+  EXPECT_EQ(expect_every_field_counts(VplSet{{Vpl{}, Vpl{}}, 3, 1, 0, 1, 1, {}, {}}), 40u);
 }
 TEST(Identity, EveryFieldOfAScenesConfigurationCounts) { EXPECT_GE(expect_every_field_counts(Scene::Config{}), 3u); }
 

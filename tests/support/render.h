@@ -81,16 +81,23 @@ inline Image render(const Scene& scene, const std::string& id, const VplSet& vpl
   return image;
 }
 
+// But spheres, which no point light stands for.
 inline VplSet lights_of_every_kind(int count) {
+  constexpr VplKind kKinds[] = {VplKind::omni, VplKind::oriented, VplKind::directional, VplKind::spot, VplKind::lobed};
   Rng rng(3, Stage::test);
   VplSet vpls;
   for (int i = 0; i < count; ++i) {
     Vpl v;
-    v.kind = static_cast<VplKind>(i % 4);
+    v.kind = kKinds[i % 5];
     v.position = random_point(rng, 0.9f);
     v.normal = v.kind == VplKind::omni ? Vec3f{} : random_direction(rng);
     v.intensity = {rng.next_float(), rng.next_float(), rng.next_float()};
     if (v.kind == VplKind::spot) v.cos_outer() = 0.3f, v.blend_cosine = 0.2f;
+    if (v.kind == VplKind::lobed) {
+      const Vec3f mirror = normalize(v.normal * 0.3f + Frame(v.normal).t);
+      v.blend_cosine = mirror.x, v.spot_cosine = mirror.y, v.spread_tan = mirror.z;
+      v.edge_or_radius = 0.8f, v.again = 0.1f, v.falloff = 0.5f;
+    }
     vpls.lights.push_back(v);
   }
   return vpls;

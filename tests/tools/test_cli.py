@@ -129,7 +129,7 @@ class Render(Cli):
         self.assertLessEqual(inner, stats["seconds"] * 1.01 + 0.001)
         self.assertEqual((stats["width"], stats["height"], stats["seed"]), (24, 24, "7"))
         self.assertEqual(stats["parameters"]["error"], "0.05")
-        self.assertEqual((self.folder / "a.vpl").stat().st_size, 40 + 76 * stats["vpls"])
+        self.assertEqual((self.folder / "a.vpl").stat().st_size, 40 + 112 * stats["vpls"])
 
     def test_peak_memory_is_the_commands_own(self):
         ballast = bytearray(os.urandom(1)) * (400 << 20)  # getrusage gives it to whom this process starts
@@ -156,7 +156,7 @@ class Render(Cli):
         self.assert_ends(self.render("-i", "exhaustive", "-o", image, "--vpl-out", lights), OK)
         whole = lights.read_bytes()
         count = int.from_bytes(whole[16:24], "little")
-        records = [whole[40 + 76 * i:40 + 76 * i + 64] for i in range(count)]
+        records = [whole[40 + 112 * i:40 + 112 * i + 64] for i in range(count)]
         old = self.folder / "old.vpl"
         old.write_bytes(b"LUMIVPL\n" + (1).to_bytes(4, "little") + (64).to_bytes(4, "little") + whole[16:24] + bytes(8) +
                         b"".join(records))

@@ -18,6 +18,17 @@ typedef struct lumicut_vpl_origin {
   uint32_t source; /* LUMICUT_SOURCE_PATH ... */
   float offset;    /* how far shadow rays start off its surface, scene units; 0: not known, found from the scene */
   float area;      /* LUMICUT_SOURCE_AREA: m2 of the emitter that it stands for, above 0; else 0 */
+  /* LUMICUT_SOURCE_PATH, oriented, on a surface that is not Lambert's: its diffuse lobe, by which the library shades with it in
+     place of the cosine alone; slope, retro, dim and falloff all 0: Lambert's. docs/decisions/0032-lobed-lights.md */
+  float mirror[3]; /* unit: where a mirror at its place would throw its light */
+  float slope;     /* of Oren and Nayar's facets, 0 to 1 */
+  float again;     /* 0 to 1: what those reflect more than once */
+  float retro;     /* of Burley's lobe: 2 roughness, 0 to 2 */
+  float dim;       /* 0 to 1/2 */
+  float falloff;   /* 0 to 1, beneath gloss: of what leaves at a cosine c so much times (1 - c)^4 is lost */
+  float
+      lobe_mean; /* mean of the lobe over Lambert's, above 0 where there is one: intensity holds it, so that hosts may take the
+                      light for a Lambertian one of the same power */
 } lumicut_vpl_origin;
 enum {
   LUMICUT_SOURCE_PATH = 0,  /* a light path that met a surface; or not known: a host's own */
