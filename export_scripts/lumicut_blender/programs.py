@@ -4,6 +4,8 @@
 An Expr is a node of an expression without loops; equal ones are one. It becomes a flat list of instructions at last.
 Numbers, vectors and colours are all three numbers; a single one stands in all three.
 """
+import math
+
 import numpy as np
 
 from .lumicut import library
@@ -541,16 +543,68 @@ class Compiler:
     def _tex_voronoi(self, node, output, stack):
         dimensions = int(node.voronoi_dimensions[0])
         at, w, scale = self.scaled(node, stack, dimensions)
-        detail = input_named(node, "Detail")
-        if detail is not None and not self.socket(detail, stack).is_number(0):
-            self.note("Voronoi Texture", "Octaves of Voronoi textures beyond the first left out")
-        if getattr(node, "normalize", False):
-            self.note("Voronoi Texture", "Voronoi textures that are normalized, taken as they are")
         what = {"Distance": 0, "Radius": 0, "Color": 1, "Position": 2, "W": 3}[output.name]
         mode = dimensions - 1 + 4 * FEATURES.index(node.feature) + 20 * METRICS.index(node.distance) + 80 * what
-        names = ("Smoothness", "Exponent", "Randomness")
-        value = Expr("voronoi", mode, (at, w, *(self.get(node, stack, n) for n in names)), mean=0.4)
+        settings = [self.get(node, stack, n) for n in ("Smoothness", "Exponent", "Randomness")]
+
+        def octave(larger):
+            places = (vector_math("SCALE", at, larger), number_math("MULTIPLY", w, larger))
+            return Expr("voronoi", mode, (*places, *settings), mean=0.4)
+
+        detail, normalized = input_named(node, "Detail"), getattr(node, "normalize", False)
+        if detail is None or node.feature == "N_SPHERE_RADIUS":
+            value = octave(ONE)
+        else:
+            value = self.octaves(node, stack, octave, what, self.farthest(node, dimensions, *settings[1:]) if normalized else None)
         return vector_math("DIVIDE", value, scale) if what > 1 else value
+
+    def farthest(self, node, dimensions, exponent, randomness):
+        """By which distances of a Voronoi Texture are normalized."""
+        reach = number_math("MULTIPLY_ADD", clamp(randomness), const(0.5), const(0.5))
+        if node.feature == "DISTANCE_TO_EDGE":
+            return reach
+        of_metric = {"MANHATTAN": const(dimensions), "CHEBYCHEV": ONE, "EUCLIDEAN": const(math.sqrt(dimensions)),
+                     "MINKOWSKI": number_math("POWER", const(dimensions), number_math("DIVIDE", ONE, exponent))}
+        if dimensions > 1:
+            reach = number_math("MULTIPLY", reach, of_metric[node.distance])
+        return number_math("MULTIPLY", reach, const(2)) if node.feature == "F2" else reach
+
+    def octaves(self, node, stack, octave, what, farthest):
+        """Sum of a Voronoi Texture's octaves as Blender has it since 4.0: of places and distances to edges rather a mean.
+        `farthest`: what distances of one octave are divided by; None: they are not."""
+        detail = self.get(node, stack, "Detail")
+        if not detail.constant():
+            self.note("Voronoi Texture", "Voronoi textures whose Detail is linked, with its mean")
+        detail = min(15.0, max(0.0, float(detail.mean[0])))
+        roughness, lacunarity = clamp(self.get(node, stack, "Roughness")), self.get(node, stack, "Lacunarity")
+        edges = node.feature == "DISTANCE_TO_EDGE"
+        total = const(8) if edges else ZERO
+        whole, amplitude, larger = farthest if edges and farthest is not None else ZERO, ONE, ONE
+        for i in range(math.ceil(detail) + 1):
+            share = const(min(1.0, detail - i + 1))  # of the last one a part
+            found = octave(larger)
+            if edges:
+                nearer = mix(amplitude, total, number_math("MINIMUM", total, number_math("DIVIDE", found, larger)))
+                total = mix(share, total, number_math("MINIMUM", total, nearer) if i > detail else nearer)
+                if farthest is not None:
+                    whole = mix(share, whole, mix(amplitude, whole, number_math("DIVIDE", farthest, larger)))
+            else:
+                if what > 1:
+                    more = mix(amplitude, total, vector_math("DIVIDE", found, larger))
+                else:
+                    more = vector_math("ADD", total, vector_math("SCALE", found, amplitude))
+                total = mix(share, total, more)
+                whole = mix(share, whole, number_math("ADD", whole, amplitude))
+            if detail == 0 or roughness.is_number(0):
+                if edges:
+                    total, whole = found, farthest
+                break
+            larger, amplitude = number_math("MULTIPLY", larger, lacunarity), number_math("MULTIPLY", amplitude, roughness)
+        if farthest is None or what > 1:
+            return total
+        if not edges and what == 0:
+            whole = number_math("MULTIPLY", whole, farthest)
+        return vector_math("DIVIDE", total, whole)
 
     def _tex_wave(self, node, output, stack):
         rings = node.wave_type == "RINGS"

@@ -306,6 +306,23 @@ class Textures(Board):
                     # Cells end with a step.
                     self.compare(output, name=output.name)
 
+    @unittest.skipIf(bpy.app.version < (4, 0, 0), "Voronoi has no octaves there")
+    def test_voronoi_octaves(self):
+        cases = [(f, d, "EUCLIDEAN") for f in ("F1", "F2", "SMOOTH_F1", "DISTANCE_TO_EDGE") for d in ("1D", "2D", "3D", "4D")]
+        cases += [("F1", "3D", m) for m in ("MANHATTAN", "CHEBYCHEV", "MINKOWSKI")]
+        for feature, dimensions, metric in self.each(cases):
+            for normalize in (False, True):
+                node = self.node("TexVoronoi", {"feature": feature, "voronoi_dimensions": dimensions, "normalize": normalize})
+                if metric != "EUCLIDEAN":
+                    node.distance = metric
+                for name, a, b in (("Scale", 1, 3), ("Detail", 0, 4), ("Roughness", 0, 1), ("Lacunarity", 1.5, 3), ("Smoothness", 0.1, 1),
+                                   ("Exponent", 0.5, 3), ("Randomness", 0.3, 1)):
+                    any_input(node, name).default_value = self.number(a, b)
+                self.place(node)
+                for output in node.outputs:
+                    if output.enabled:
+                        self.compare(output, name=f"{output.name} {normalize}")
+
     def test_wave(self):
         cases = [("BANDS", "bands_direction", d) for d in ("X", "Y", "Z", "DIAGONAL")]
         cases += [("RINGS", "rings_direction", d) for d in ("X", "Y", "Z", "SPHERICAL")]
