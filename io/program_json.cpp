@@ -26,7 +26,7 @@ const std::vector<Op> kOps = {
     {"behind", 0, 1},    {"camera", 0, 4},    {"transform", 1, 3},   {"math", 3, 41},      {"vector", 3, 27},
     {"grey", 1, 2},      {"separate", 1, 3},  {"combine", 3, 1},     {"clamp", 3, 2},      {"map_range", 6, 16},
     {"mapping", 4, 4},   {"rotate", 4, 10},   {"mix", 3, 19},        {"color", 4, 7},      {"ramp", 1, 2},
-    {"curves", 2, 2},    {"fresnel", 2, 3},   {"bump", 4, 1},        {"normal_map", 2, 2}, {"noise", 8, 80},
+    {"curves", 2, 2},    {"fresnel", 2, 3},   {"bump", 5, 1},        {"normal_map", 2, 2}, {"noise", 8, 80},
     {"musgrave", 7, 20}, {"voronoi", 5, 320}, {"wave", 6, 24},       {"magic", 2, 11},     {"brick", 6, 1},
     {"checker", 1, 1},   {"gradient", 1, 7},  {"white_noise", 2, 8}, {"project", 1, 4},    {"image", 3, 8}};
 

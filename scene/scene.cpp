@@ -29,8 +29,8 @@ float largest_term(const Transform& t, const Vec3f& p) {
 constexpr float kInvPi = 0.31830988618f;
 // A viewer that sees about the mean of what depends on the view.
 Vec3f mean_view(const Vec3f& normal) { return normal * (2.0f / 3.0f) + Frame(normal).t * 0.745356f; }
-// Over which the slope of a program's bumps is taken: a share of the distance, and of a hit's offset.
-constexpr float kBumpStep = 5e-4f, kLeastBumpStep = 50.0f;
+// Over which the slope of a program's bumps is taken at least, in offsets of a hit: far above the precision of places.
+constexpr float kLeastBumpStep = 50.0f;
 
 // A turned normal that does not lie below the surface itself.
 Vec3f above_surface(Vec3f n, const SurfaceHit& hit) {
@@ -515,8 +515,7 @@ Rgb Scene::programmed(const TextureProgram& program, const SurfaceView& view, Ve
     p.mesh = &meshes_[hit->mesh], p.triangle = hit->triangle, p.instance = hit->instance;
     p.u = hit->u, p.v = hit->v;
     if (instanced_) p.to_world = &instance(hit->mesh, hit->instance);
-    // About a pixel's width of a view of some thousand, and far above the precision of places.
-    p.step = std::max(kBumpStep * (std::isfinite(hit->t) ? hit->t : 0.0f), kLeastBumpStep * hit->offset);
+    p.distance = std::isfinite(hit->t) ? hit->t : 0.0f, p.least_step = kLeastBumpStep * hit->offset;
   }
   return program.evaluate(p, textures_);
 }

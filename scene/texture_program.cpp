@@ -686,7 +686,10 @@ Rgb TextureProgram::evaluate(const ProgramPoint& point, std::span<const Texture>
   return is_finite(last) ? last : each(last, [](float x) { return std::isfinite(x) ? x : 0.0f; });
 }
 
-// [Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU"], the slopes by differences over `step`.
+// Over which slopes are taken unless told, as a share of the distance: about a pixel of a view of some thousand.
+constexpr float kBumpWidth = 5e-4f;
+
+// [Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU"], the slopes by differences over a step.
 Vec3f TextureProgram::bump(const ProgramInstruction& in, const ProgramPoint& p, std::span<const Texture> textures,
                            const Vec3f* values) const {
   const auto input = [&](size_t k) -> const Vec3f& {
@@ -694,7 +697,9 @@ Vec3f TextureProgram::bump(const ProgramInstruction& in, const ProgramPoint& p, 
   };
   const Vec3f normal = input(3);
   const float strength = std::max(input(1).x, 0.0f), distance = input(2).x;
-  if (p.mesh == nullptr || !(p.step > 0.0f) || in.inputs[0] < 0 || strength == 0.0f || distance == 0.0f) return normal;
+  const float width = input(4).x, step = std::max(p.least_step, (width > 0.0f ? width : kBumpWidth) * p.distance);
+  if (p.mesh == nullptr || !(p.least_step > 0.0f) || in.inputs[0] < 0 || strength == 0.0f || distance == 0.0f)
+    return normal;
   const Vec3f a = corner_at(p, 0), e1 = corner_at(p, 1) - a, e2 = corner_at(p, 2) - a;
   const float l11 = dot(e1, e1), l12 = dot(e1, e2), l22 = dot(e2, e2), det = l11 * l22 - l12 * l12;
   if (!(det > 0.0f)) return normal;
@@ -705,7 +710,7 @@ Vec3f TextureProgram::bump(const ProgramInstruction& in, const ProgramPoint& p, 
   alignas(Vec3f) unsigned char memory[kMostInstructions * sizeof(Vec3f)];
   auto* shifted = reinterpret_cast<Vec3f*>(memory);
   for (int k = 0; k < 2; ++k) {
-    const Vec3f d = *along[k] * p.step;
+    const Vec3f d = *along[k] * step;
     const float d1 = dot(d, e1), d2 = dot(d, e2);
     const float du = (d1 * l22 - d2 * l12) / det, dv = (d2 * l11 - d1 * l12) / det;
     ProgramPoint q = p;
@@ -716,7 +721,7 @@ Vec3f TextureProgram::bump(const ProgramInstruction& in, const ProgramPoint& p, 
       q.uv.x += du * (u1.x - u0.x) + dv * (u2.x - u0.x), q.uv.y += du * (u1.y - u0.y) + dv * (u2.y - u0.y);
     }
     for (uint32_t i : heights_[in.data]) new (&shifted[i]) Vec3f(value(instructions_[i], q, textures, shifted, true));
-    slopes[k] = (shifted[in.inputs[0]].x - here) / p.step;
+    slopes[k] = (shifted[in.inputs[0]].x - here) / step;
   }
   // The slope lies in the shading normal's plane.
   Vec3f slope = frame.t * slopes[0] + frame.b * slopes[1];

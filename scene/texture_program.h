@@ -46,7 +46,7 @@ struct Transform;
   X(curves, 2, 2, table)         \
   /* By the view, and normals */ \
   X(fresnel, 2, 3, none)         \
-  X(bump, 4, 1, none)            \
+  X(bump, 5, 1, none)            \
   X(normal_map, 2, 2, attribute) \
   /* Patterns */                 \
   X(noise, 8, 80, none)          \
@@ -98,7 +98,8 @@ struct ProgramPoint {
   float u = 0.0f, v = 0.0f;  // barycentric
   const Transform* to_world = nullptr;
   const Camera* camera = nullptr;
-  float step = 0.0f;  // over which the slope of a bump is taken; 0: no bumps
+  // From where the ray came, and the least length over which the slope of a bump is taken; 0: no bumps.
+  float distance = 0.0f, least_step = 0.0f;
 };
 
 class TextureProgram {

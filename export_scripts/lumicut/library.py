@@ -43,7 +43,7 @@ FOREVER = NO_ID = 0xFFFFFFFF
 PROGRAM_OPS = ("uv attribute position normal to_viewer behind camera transform math vector grey separate combine clamp map_range "
                "mapping rotate mix color ramp curves fresnel bump normal_map noise musgrave voronoi wave magic brick checker "
                "gradient white_noise project image").split()
-PROGRAM_INPUTS = (0, 0, 0, 0, 0, 0, 0, 1, 3, 3, 1, 1, 3, 3, 6, 4, 4, 3, 4, 1, 2, 2, 4, 2, 8, 7, 5, 6, 2, 6, 1, 1, 2, 1, 3)
+PROGRAM_INPUTS = (0, 0, 0, 0, 0, 0, 0, 1, 3, 3, 1, 1, 3, 3, 6, 4, 4, 3, 4, 1, 2, 2, 5, 2, 8, 7, 5, 6, 2, 6, 1, 1, 2, 1, 3)
 OF_VERTICES, OF_TRIANGLES, OF_INSTANCES = range(3)
 
 

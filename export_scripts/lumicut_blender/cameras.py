@@ -63,6 +63,17 @@ def fit(render, camera_data):
     return horizontal, camera_data.sensor_height if mode == "VERTICAL" else camera_data.sensor_width, width, height
 
 
+def pixel_width(camera, render):
+    """Of a pixel of the frame as a share of the distance from a camera object; 0: no camera, or an orthographic one."""
+    if camera is None or camera.type != "CAMERA" or camera.data.type == "ORTHO":
+        return 0.0
+    rows = max(1.0, render.resolution_y * render.resolution_percentage / 100)
+    if camera.data.type == "PANO":
+        return math.pi / rows
+    horizontal, sensor, width, height = fit(render, camera.data)
+    return sensor / camera.data.lens / (width / height if horizontal else 1.0) / rows
+
+
 LIKE_EQUISOLID = 0.002  # radians from which a lens shows to be another: a pixel where 800 span a right angle
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from . import lights, linking, mesh_attributes, program_values, programs, strands, worlds
 from .lumicut import library
-from .cameras import rows
+from .cameras import pixel_width, rows
 from .images import srgb_to_linear
 from .materials import Materials
 from .report import Report
@@ -287,6 +287,7 @@ class Collector:
         self.materials = Materials(self.report, max_shininess, images, check)
         render = depsgraph.scene_eval.render
         self.materials.aspect = (render.resolution_x * render.pixel_aspect_x) / max(1e-9, render.resolution_y * render.pixel_aspect_y)
+        self.materials.pixel = pixel_width(depsgraph.scene_eval.camera, render)
         self.materials.aov = aov
         self.materials.images.frame = depsgraph.scene_eval.frame_current
         self.scene = SceneData()

@@ -152,6 +152,7 @@ class SurfaceReader(Evaluator):
     all_rays = True
     programs = True
     material_index = 0
+    pixel = 0.0  # over which slopes of bumps are taken, as a share of the distance; 0: the library's own
     base_normal = NORMAL  # of sockets that nothing feeds
     normals = None  # (picture, strength)
     heights = None  # (picture, distance, strength)
@@ -578,7 +579,7 @@ class Materials:
         self.report, self.max_shininess = report, max_shininess
         self.images = images or Images(report, check)
         self.converted, self.pictures = [], []
-        self.aspect, self.aov = 1.0, None
+        self.aspect, self.pixel, self.aov = 1.0, 0.0, None  # of the frame: width over height; cameras.pixel_width
         self._attributes = {}
         self.displacements = {}  # (height, whether in the world's units) by the full name of materials that move vertices
         self._numbers, self._picture_numbers = {}, {}
@@ -842,7 +843,7 @@ class Materials:
             if height is not None and method != "BUMP":
                 self.displacements[material.name_full] = height
             if height is not None and method != "DISPLACEMENT" and not height[0].constant():
-                reader.base_normal = bump_of(height[0], moved=method == "BOTH")
+                reader.base_normal = bump_of(height[0], moved=method == "BOTH", width=reader.pixel)
         except CannotCompile as what:
             reader.note(str(what), "Displacement left out")
 
@@ -858,20 +859,24 @@ class Materials:
         """What the material's tree gives to the output of that name; None: it has none."""
         if material is None or not material.use_nodes or material.node_tree is None:
             return None
-        reader = SurfaceReader(name, self.images, self.report)
-        reader.aspect, reader.material_index = self.aspect, material.pass_index
+        reader = self._reader(material, name)
         for node in material.node_tree.nodes:
             if node.type == "OUTPUT_AOV" and self.aov[0] in {getattr(node, "aov_name", ""), node.name}:
                 return reader.value(node.inputs["Value" if self.aov[1] == "VALUE" else "Color"], ())
         return None
+
+    def _reader(self, material, name):
+        reader = SurfaceReader(name, self.images, self.report)
+        reader.aspect, reader.pixel, reader.material_index = self.aspect, self.pixel, material.pass_index
+        return reader
 
     def _shaded_surface(self, material, name, ray):
         if material is None:
             return Surface(diffuse=Value(0.8)), None, None
         if not compat.has_nodes(material):
             return Surface(diffuse=Value(list(material.diffuse_color)[:3])), None, None
-        reader = SurfaceReader(name, self.images, self.report)
-        reader.ray, reader.aspect, reader.material_index = ray, self.aspect, material.pass_index
+        reader = self._reader(material, name)
+        reader.ray = ray
         tree = material.node_tree
         output = tree.get_output_node("CYCLES") or tree.get_output_node("ALL")
         if output is None:

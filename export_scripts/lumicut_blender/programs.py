@@ -200,12 +200,12 @@ def mapped_normal(colour, strength, uv_map):
     return Expr("normal_map", 1, (colour, strength), ("tangent", uv_map), mean=0)
 
 
-def bump_of(height, moved):
+def bump_of(height, moved, width):
     """The normal that a displacement by height gives. `moved`: of vertices too, from where the height is looked up."""
     if moved:
         before = Expr("transform", 0, (attribute(("undisplaced",)),), ("object_to_world",), mean=0)
         height = replaced(height, {POSITION.key: before}, {})
-    return Expr("bump", 0, (height, ONE, ONE, NORMAL), mean=0)
+    return Expr("bump", 0, (height, ONE, ONE, NORMAL, const(width)), mean=0)
 
 
 def replaced(expr, table, data):
@@ -487,8 +487,11 @@ class Compiler:
         distance = self.get(node, stack, "Distance")
         if node.invert:
             distance = number_math("MULTIPLY", distance, const(-1))
+        # A share of a pixel, since 4.3; 1 in files from before.
+        width = number_math("MULTIPLY", self.get(node, stack, "Filter Width"), const(self.reader.pixel)) if "Filter Width" in node.inputs \
+            else const(self.reader.pixel)
         return Expr("bump", 0, (self.get(node, stack, "Height"), self.get(node, stack, "Strength"), distance,
-                                self.normal_input(node, stack)), mean=0)
+                                self.normal_input(node, stack), width), mean=0)
 
     def _normal_map(self, node, output, stack):
         colour, strength = self.get(node, stack, "Color"), self.get(node, stack, "Strength")

@@ -271,8 +271,8 @@ TEST(TextureProgram, ABumpTiltsTheNormalByTheSlopeOfItsHeight) {
   // Height = x / 2.
   const OneTriangle s(
       {{step(ProgramOp::position), step(ProgramOp::separate, {0}), step(ProgramOp::math, {1, -1, -1}, 2),
-        step(ProgramOp::normal), step(ProgramOp::bump, {2, -2, -2, 3})},
-       {{0.5f, 0, 0}, {1, 1, 1}},
+        step(ProgramOp::normal), step(ProgramOp::bump, {2, -2, -2, 3, -3})},
+       {{0.5f, 0, 0}, {1, 1, 1}, {0, 0, 0}},
        {}},
       {}, true);
   const Vec3f n = s.at(1, 1).bsdf.normal(), wanted = normalize(Vec3f{-0.5f, 0, 1});
@@ -280,6 +280,22 @@ TEST(TextureProgram, ABumpTiltsTheNormalByTheSlopeOfItsHeight) {
   EXPECT_NEAR(n.x, wanted.x, 1e-3);
   EXPECT_NEAR(n.y, 0, 1e-3);
   EXPECT_NEAR(n.z, wanted.z, 1e-3);
+}
+
+TEST(TextureProgram, ABumpShowsAStepOfItsHeightAsWideAsItIsTold) {
+  const auto tilted = [](float width, float x) {
+    const OneTriangle s({{step(ProgramOp::position), step(ProgramOp::checker, {0}), step(ProgramOp::normal),
+                          step(ProgramOp::bump, {1, -1, -1, 2, -2})},
+                         {{1, 1, 1}, {width, 0, 0}},
+                         {}},
+                        {}, true);
+    return s.at(x, 0.5f).bsdf.normal().z < 0.999f;
+  };
+  // The ray comes from 3 units; the height changes at x = 1, and slopes are taken to one side.
+  EXPECT_NE(tilted(0.1f, 0.8f), tilted(0.1f, 1.2f)) << "steps of 0.3 reach over it";
+  EXPECT_FALSE(tilted(0.1f, 0.6f) || tilted(0.1f, 1.4f));
+  EXPECT_FALSE(tilted(0.05f, 0.8f) || tilted(0.05f, 1.2f)) << "steps of 0.15 do not";
+  EXPECT_NE(tilted(0, 0.999f), tilted(0, 1.001f)) << "nor does a two-thousandth, but 0.0015 wide";
 }
 
 TEST(TextureProgram, ReferencesAreCheckedWhenTheSceneIsCommitted) {

@@ -91,7 +91,8 @@ enum {
   LUMICUT_OP_CURVES = 20,    /* [share, colour] table: the range's ends, then three numbers a place; mode 1: straight on beyond it */
   /* By the view, and normals */
   LUMICUT_OP_FRESNEL = 21,   /* [index or blend, normal] mode 0: of the index, 1: of the blend, 2: facing by the blend */
-  LUMICUT_OP_BUMP = 22,      /* [height, strength, distance, normal] a normal */
+  LUMICUT_OP_BUMP = 22,      /* [height, strength, distance, normal, width] a normal; width: over which slopes are taken,
+                                a share of how far the ray came, 0: 5e-4, about a pixel of two thousand; steps show so wide */
   LUMICUT_OP_NORMAL_MAP = 23, /* [colour, strength] a normal; mode 0: along the mesh's uv, 1: along the attribute `data` */
   /* Patterns. In one dimension w alone counts, in two to three the vector, in four both */
   LUMICUT_OP_NOISE = 24,     /* [vector, w, detail, roughness, lacunarity, offset, gain, distortion] mode: dimensions - 1, + 4 times the kind
