@@ -42,8 +42,11 @@ Bsdf::Bsdf(const BsdfParameters& parameters, const SurfaceView& view)
   if (parameters.model != LobeModel::ggx) {
     p.mirror = normalize(reflect(to_viewer_, p.normal));
     p.diffuse = parameters.diffuse * kInvPi;
-    if (parameters.slope > 0.0f)
-      set_oren_nayar(parameters.diffuse, parameters.slope, parameters.facets_once, set_mirror(to_viewer_, p), p);
+    if (parameters.slope > 0.0f) {
+      const Grooves facets =
+          grooves(parameters.diffuse, parameters.slope, parameters.diffuse_once, set_mirror(to_viewer_, p));
+      p.diffuse *= facets.scale, p.slope = facets.slope, p.again = facets.again;
+    }
     p.specular = parameters.specular * cosine_lobe_scale(parameters.model == LobeModel::phong, parameters.exponent);
     p.shape = parameters.exponent;
     diffuse_color_ = parameters.diffuse, specular_color_ = parameters.specular;
@@ -57,7 +60,7 @@ Bsdf::Bsdf(const BsdfParameters& parameters, const SurfaceView& view)
   const float cosine = set_mirror(to_viewer_, p);
   const GgxDiffuse diffuse = ggx_diffuse(colors_, parameters, cosine);
   p.diffuse = diffuse.scale * kInvPi;
-  p.falloff = diffuse.falloff;
+  p.falloff = diffuse.falloff, p.slope = diffuse.slope, p.again = diffuse.again;
   p.retro = 2.0f * std::sqrt(colors_.alpha) * diffuse.burley, p.dim = 0.5f * diffuse.burley;
   p.lobe = kLobe<GgxReflection>, p.shape = std::max(kLeastAlpha, colors_.alpha);
   p.ior = colors_.ior;

@@ -13,13 +13,14 @@ enum class LobeModel { blinn, phong, ggx };
 struct BsdfParameters {
   LobeModel model = LobeModel::blinn;
   Rgb diffuse{},
-      specular{};            // kd and ks; GGX: base colour, and factor of the dielectric's F0 (or F0 without `fresnel`)
-  Rgb translucency{};        // what is passed on evenly to the other side
-  float slope = 0.0f;        // Oren and Nayar's diffuse, of Blinn and Phong (bsdf/oren_nayar.h); 0: Lambert's
-  bool facets_once = false;  // what facets reflect more than once is lost: of that, and of GGX
-  float exponent = 0.0f;     // Blinn, Phong
+      specular{};      // kd and ks; GGX: base colour, and factor of the dielectric's F0 (or F0 without `fresnel`)
+  Rgb translucency{};  // what is passed on evenly to the other side
+  float slope = 0.0f;  // Oren and Nayar's diffuse (bsdf/oren_nayar.h); 0: Lambert's
+  bool diffuse_once = false;  // of that: what facets reflect more than once is lost
+  float exponent = 0.0f;      // Blinn, Phong
   // GGX alone.
   bool fresnel = true;
+  bool facets_once = false;    // of metal and rough glass: what facets reflect more than once is lost
   bool bright_lobe = false;    // it makes the lobe brighter, instead of leaving evenly
   Rgb specular_tint{1, 1, 1};  // of metal at 82 degrees, and of what glass reflects
   bool additive = false;       // Burley's diffuse, from which the lobes above take nothing

@@ -6,6 +6,7 @@
 #include "bsdf/dielectric.h"
 #include "bsdf/ggx.h"
 #include "bsdf/lobe_transmittance.h"
+#include "bsdf/oren_nayar.h"
 
 namespace lumicut {
 
@@ -69,10 +70,16 @@ inline GgxColors ggx_colors(const BsdfParameters& m) {
 // The part of a GGX surface that scatters evenly: what its coat lets through to the diffuse base, and what the facets
 // of rough metal reflect more than once.
 struct GgxDiffuse {
-  Rgb scale;      // with the view's factor, without the light's; over π: the BRDF
-  float falloff;  // towards grazing light
-  float burley;   // share that is Burley's
+  Rgb scale;           // with the view's factor, without the light's; over π: the BRDF
+  float falloff;       // towards grazing light
+  float burley;        // share that is Burley's
+  float slope, again;  // of the base's facets (bsdf/oren_nayar.h)
 };
+
+// What gloss without Fresnel leaves of a white surface was mixed with the base: the base's own colour.
+inline Rgb base_color(const GgxColors& c) {
+  return c.bare ? c.base / std::max(1e-3f, 1.0f - max_component(c.specular)) : c.base;
+}
 
 inline Rgb mean_reflectance(const Rgb& f0, const Rgb& f90) { return f0 + (f90 - f0) * kMeanShare; }
 
@@ -94,8 +101,14 @@ inline GgxDiffuse ggx_diffuse(const GgxColors& c, const BsdfParameters& m, float
   const float f0 = max_component(c.f0);
   const LobeTransmittance rest =
       m.additive ? LobeTransmittance{1.0f, 0.0f} : lobe_transmittance(f0, c.f90, c.ior, c.alpha, cosine);
-  const Rgb coat = c.base * (c.opaque * rest.to_viewer / mean_diffuse_falloff(rest.falloff));
-  if (!(c.metal > 0.0f) || m.facets_once || m.bright_lobe) return {coat, rest.falloff, m.additive ? 1.0f : 0.0f};
+  Rgb coat = c.base * (c.opaque * rest.to_viewer / mean_diffuse_falloff(rest.falloff));
+  Grooves facets;
+  if (m.slope > 0.0f) {
+    facets = grooves(base_color(c), m.slope, m.diffuse_once, cosine);
+    coat *= facets.scale;
+  }
+  if (!(c.metal > 0.0f) || m.facets_once || m.bright_lobe)
+    return {coat, rest.falloff, m.additive ? 1.0f : 0.0f, facets.slope, facets.again};
   const float mean_lost = mean_facet_loss(c.alpha), lost = facet_loss(c.alpha, cosine);
   const Rgb mean = mean_reflectance(c.base, c.metal_edge);
   Rgb metal{};
@@ -103,8 +116,9 @@ inline GgxDiffuse ggx_diffuse(const GgxColors& c, const BsdfParameters& m, float
     metal[k] = c.metal * mean[k] * mean[k] * (1.0f - mean_lost) / (1.0f - mean[k] * mean_lost) * lost /
                mean_diffuse_falloff(1.0f);
   const float whole = luminance(coat) + luminance(metal);
+  const float of_coat = whole > 0.0f ? luminance(coat) / whole : 0.0f;
   const float falloff = whole > 0.0f ? (luminance(coat) * rest.falloff + luminance(metal)) / whole : rest.falloff;
-  return {coat + metal, falloff, m.additive && whole > 0.0f ? luminance(coat) / whole : 0.0f};
+  return {coat + metal, falloff, m.additive ? of_coat : 0.0f, facets.slope * of_coat, facets.again * of_coat};
 }
 
 }  // namespace lumicut

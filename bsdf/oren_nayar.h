@@ -9,7 +9,6 @@
 #define LUMICUT_BSDF_OREN_NAYAR_H_
 
 #include <algorithm>
-#include <numbers>
 
 #include "bsdf/shade_points.h"
 
@@ -41,22 +40,27 @@ inline float mean_oren_nayar_factor(float slope, float again, float view) {
   return 1.0f + slope * kGrooveEdge * groove_edge(view) + again * (1.0f - kMeanGrooveEdge);
 }
 
-// The diffuse part of facets of that slope (0..1) for a surface seen at `view`; `once`: without what comes back.
-inline void set_oren_nayar(const Rgb& color, float slope, bool once, float view, SurfacePoint& p) {
+// What facets of a slope (0..1) make of a Lambert part of that colour: its factor, and the numbers of the point.
+struct Grooves {
+  Rgb scale{1, 1, 1};
+  float slope = 0.0f, again = 0.0f;
+};
+
+// For a surface seen at `view`, of a slope above 0; `once`: without what comes back.
+inline Grooves grooves(const Rgb& color, float slope, bool once, float view) {
   const float whole = 1.0f / (1.0f + slope * kGrooveEdge);
-  p.slope = slope, p.again = 0.0f;
-  p.diffuse = color * (whole * std::numbers::inv_pi_v<float>);
-  if (once) return;
+  Grooves g{Rgb{1, 1, 1} * whole, slope, 0.0f};
+  if (once) return g;
   // In Blender 4.3 the colour stands in this as one facet's more than in the series of reflections.
   const float lost = (1.0f - whole) * (1.0f - kMeanGrooveEdge);
   const auto again = [&](float c) {
     return c * c * (1.0f - lost) / ((1.0f - kMeanGrooveEdge) * (1.0f - c * lost)) * slope * kGrooveEdge *
            (1.0f - groove_edge(view));
   };
-  p.again = again(std::min(1.0f, luminance(color)));
-  const float mean = mean_oren_nayar_factor(slope, p.again, view);
-  for (int k = 0; k < 3; ++k)
-    p.diffuse[k] *= mean_oren_nayar_factor(slope, again(std::min(1.0f, color[k])), view) / mean;
+  g.again = again(std::min(1.0f, luminance(color)));
+  const float mean = mean_oren_nayar_factor(slope, g.again, view);
+  for (int k = 0; k < 3; ++k) g.scale[k] *= mean_oren_nayar_factor(slope, again(std::min(1.0f, color[k])), view) / mean;
+  return g;
 }
 
 }  // namespace lumicut

@@ -613,8 +613,9 @@ uint32_t SceneBuilder::variant_of(uint32_t material, const lumicut_material& val
 
 bool SceneBuilder::reads_vertices(uint32_t material) const {
   const lumicut_material& m = scene.materials.at(material).values;
-  for (const int32_t texture : {m.diffuse_texture, m.specular_texture, m.translucency_texture, m.roughness_texture,
-                                m.metallic_texture, m.opacity_texture, m.emission_texture, m.normal_texture}) {
+  for (const int32_t texture :
+       {m.diffuse_texture, m.specular_texture, m.translucency_texture, m.roughness_texture, m.diffuse_roughness_texture,
+        m.metallic_texture, m.opacity_texture, m.emission_texture, m.normal_texture}) {
     if (texture <= 0) continue;
     const auto& program = scene.textures.at(static_cast<size_t>(texture) - 1).program;
     if (program && std::any_of(program->instructions.begin(), program->instructions.end(),

@@ -324,7 +324,11 @@ class SceneReader {
       if (!ggx) open->fail("is of the model \"ggx\" alone");
       set_flag(LUMICUT_OPEN_GLASS, open->boolean());
     }
-    if (!ggx) m.flags &= ~uint32_t{LUMICUT_NO_FRESNEL | LUMICUT_BURLEY | LUMICUT_SHADOWS_PASS};
+    if (auto facets = object.find("diffuse_facets")) {
+      if (!ggx) facets->fail("is of the model \"ggx\" alone");
+      set_flag(LUMICUT_DIFFUSE_ONCE, facets->choice({"often", "once"}) == 1);
+    }
+    if (!ggx) m.flags &= ~uint32_t{LUMICUT_NO_FRESNEL | LUMICUT_BURLEY | LUMICUT_SHADOWS_PASS | LUMICUT_DIFFUSE_ONCE};
     if (auto tint = object.find("specular_tint")) {
       if (!ggx) tint->fail("is of the model \"ggx\" alone");
       store(m.specular_tint, tint->vector3(1e-6, 1));
@@ -351,6 +355,11 @@ class SceneReader {
     number("shininess", m.shininess, 0, 1e6, !ggx);
     number("roughness", m.roughness, 0, 1, ggx || (m.flags & LUMICUT_OREN_NAYAR) != 0,
            "the model \"ggx\" and of \"oren_nayar\" surfaces");
+    number("diffuse_roughness", m.diffuse_roughness, 0, 1, ggx);
+    if ((m.flags & LUMICUT_BURLEY) != 0 && m.diffuse_roughness > 0) {
+      if (auto given = object.find("diffuse_roughness")) given->fail("must be 0 where \"burley\" is true");
+      object.need("burley").fail("must be false where \"diffuse_roughness\" is above 0");
+    }
     number("metallic", m.metallic, 0, 1, ggx);
     number("transmission", m.transmission, 0, 1, ggx);
     if ((m.flags & LUMICUT_NO_FRESNEL) != 0)
@@ -395,7 +404,8 @@ class SceneReader {
         flag("blend_stored", LUMICUT_BLEND_STORED);
         flag("by_view", LUMICUT_BY_VIEW);
         if (auto given = keys.find("by_view"); given && given->boolean() && !by_view)
-          given->fail("is for diffuse, specular, translucency, roughness and metallic textures alone");
+          given->fail(
+              "is for diffuse, specular, translucency, roughness, diffuse_roughness and metallic textures alone");
         keys.finish();
         out = textures_.get(resolve(file), use, flags, user);
       } else {
@@ -418,11 +428,12 @@ class SceneReader {
       m.bump_distance = static_cast<float>(scale_);
     }
     if (auto strength = object.find("bump_strength")) m.bump_strength = static_cast<float>(strength->number(1e-3, 10));
-    for (const char* key : {"roughness_texture", "metallic_texture"})
+    for (const char* key : {"roughness_texture", "metallic_texture", "diffuse_roughness_texture"})
       if (auto given = object.find(key); given && !ggx && !given->raw().is_null())
         given->fail("is of the model \"ggx\" alone");
     texture("roughness_texture", m.roughness_texture, TextureUse::numbers, true);
     texture("metallic_texture", m.metallic_texture, TextureUse::numbers, true);
+    texture("diffuse_roughness_texture", m.diffuse_roughness_texture, TextureUse::numbers, true);
   }
 
   // ---- Programs ----

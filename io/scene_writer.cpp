@@ -301,6 +301,7 @@ class Writer {
     }
     if (ggx && (m.flags & (LUMICUT_BRIGHT_LOBE | LUMICUT_FACETS_ONCE)) != 0)
       out["multiple_scattering"] = (m.flags & LUMICUT_BRIGHT_LOBE) != 0 ? "lobe" : "none";
+    if ((m.flags & LUMICUT_DIFFUSE_ONCE) != 0) out["diffuse_facets"] = "once";
     flag(LUMICUT_SHADOWS_PASS, "shadows_pass", true);
     flag(LUMICUT_OPEN_GLASS, "open_glass", true);
     flag(LUMICUT_EMIT_BOTH_SIDES, "emit_both_sides", true);
@@ -319,6 +320,7 @@ class Writer {
     if (m.opacity != 0) number("opacity", m.opacity, 1);
     if (ggx) {
       number("roughness", m.roughness, usual.roughness);
+      number("diffuse_roughness", m.diffuse_roughness, 0);
       number("metallic", m.metallic, 0), number("transmission", m.transmission, 0);
       if (m.ior != 0) number("ior", m.ior, usual.ior);
       number("coat", m.coat, 0), number("coat_roughness", m.coat_roughness, 0), number("coat_ior", m.coat_ior, 0);
@@ -336,7 +338,10 @@ class Writer {
     image("opacity_texture", m.opacity_texture), image("emission_texture", m.emission_texture);
     image("translucency_texture", m.translucency_texture), image("normal_texture", m.normal_texture);
     image("height_texture", m.height_texture);
-    if (ggx) image("roughness_texture", m.roughness_texture), image("metallic_texture", m.metallic_texture);
+    if (ggx) {
+      image("roughness_texture", m.roughness_texture), image("metallic_texture", m.metallic_texture);
+      image("diffuse_roughness_texture", m.diffuse_roughness_texture);
+    }
     return out;
   }
 

@@ -94,7 +94,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   c.flags("flags", in.flags,
           LUMICUT_EMIT_BOTH_SIDES | LUMICUT_PHONG | LUMICUT_GGX | LUMICUT_NO_FRESNEL | LUMICUT_BURLEY |
               LUMICUT_SHADOWS_PASS | LUMICUT_HOLDOUT | LUMICUT_BUMP_SHADOWS | LUMICUT_OREN_NAYAR | LUMICUT_FACETS_ONCE |
-              LUMICUT_OPEN_GLASS | LUMICUT_BRIGHT_LOBE);
+              LUMICUT_OPEN_GLASS | LUMICUT_BRIGHT_LOBE | LUMICUT_DIFFUSE_ONCE);
   if ((in.flags & LUMICUT_PHONG) != 0 && (in.flags & LUMICUT_GGX) != 0)
     c.fail("flags", "holds both LUMICUT_PHONG and LUMICUT_GGX");
   if ((in.flags & LUMICUT_NO_FRESNEL) != 0) {
@@ -105,11 +105,14 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   if ((in.flags & LUMICUT_BURLEY) != 0) {
     if ((in.flags & LUMICUT_GGX) == 0) c.fail("flags", "holds LUMICUT_BURLEY without LUMICUT_GGX");
     if ((in.flags & LUMICUT_NO_FRESNEL) != 0) c.fail("flags", "holds both LUMICUT_BURLEY and LUMICUT_NO_FRESNEL");
+    if (in.diffuse_roughness > 0.0f) c.fail("diffuse_roughness", "must be 0 with LUMICUT_BURLEY");
   }
   if ((in.flags & LUMICUT_OREN_NAYAR) != 0 && (in.flags & LUMICUT_GGX) != 0)
     c.fail("flags", "holds both LUMICUT_OREN_NAYAR and LUMICUT_GGX");
   if ((in.flags & LUMICUT_FACETS_ONCE) != 0 && (in.flags & (LUMICUT_OREN_NAYAR | LUMICUT_GGX)) == 0)
     c.fail("flags", "holds LUMICUT_FACETS_ONCE without LUMICUT_OREN_NAYAR or LUMICUT_GGX");
+  if ((in.flags & LUMICUT_DIFFUSE_ONCE) != 0 && (in.flags & LUMICUT_GGX) == 0)
+    c.fail("flags", "holds LUMICUT_DIFFUSE_ONCE without LUMICUT_GGX");
   if ((in.flags & LUMICUT_BRIGHT_LOBE) != 0) {
     if ((in.flags & LUMICUT_GGX) == 0) c.fail("flags", "holds LUMICUT_BRIGHT_LOBE without LUMICUT_GGX");
     if ((in.flags & LUMICUT_FACETS_ONCE) != 0)
@@ -130,6 +133,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   c.range("opacity", in.opacity, 0.0f, 1.0f);
   c.not_negative("emission", in.emission);
   c.range("roughness", in.roughness, 0.0f, 1.0f);
+  c.range("diffuse_roughness", in.diffuse_roughness, 0.0f, 1.0f);
   c.range("metallic", in.metallic, 0.0f, 1.0f);
   if (in.ior != 0.0f) c.range("ior", in.ior, 0.1f, 10.0f);
   c.range("transmission", in.transmission, 0.0f, 1.0f);
@@ -145,6 +149,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   m.fresnel = (in.flags & LUMICUT_NO_FRESNEL) == 0;
   m.burley = (in.flags & LUMICUT_BURLEY) != 0, m.bright_lobe = (in.flags & LUMICUT_BRIGHT_LOBE) != 0;
   m.oren_nayar = (in.flags & LUMICUT_OREN_NAYAR) != 0, m.facets_once = (in.flags & LUMICUT_FACETS_ONCE) != 0;
+  m.diffuse_roughness = in.diffuse_roughness, m.diffuse_once = (in.flags & LUMICUT_DIFFUSE_ONCE) != 0;
   m.shadows_pass = (in.flags & LUMICUT_SHADOWS_PASS) != 0, m.open_glass = (in.flags & LUMICUT_OPEN_GLASS) != 0;
   m.holdout = (in.flags & LUMICUT_HOLDOUT) != 0;
   m.bump_shadows = (in.flags & LUMICUT_BUMP_SHADOWS) != 0;
@@ -171,6 +176,7 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   m.bump_strength = in.bump_strength == 0.0f ? 1.0f : in.bump_strength;
   m.roughness_texture = texture_index(c, "roughness_texture", in.roughness_texture);
   m.metallic_texture = texture_index(c, "metallic_texture", in.metallic_texture);
+  m.diffuse_roughness_texture = texture_index(c, "diffuse_roughness_texture", in.diffuse_roughness_texture);
   m.opacity_texture = texture_index(c, "opacity_texture", in.opacity_texture);
   m.emission_texture = texture_index(c, "emission_texture", in.emission_texture);
   m.translucency = vec(in.translucency);

@@ -45,7 +45,7 @@ LUMICUT_DESCRIPTOR(lumicut_material, F(struct_size), F(flags), F(diffuse), F(shi
                    F(roughness), F(metallic), F(ior), F(transmission), F(normal_texture), F(normal_strength),
                    F(height_texture), F(bump_distance), F(bump_strength), F(roughness_texture), F(metallic_texture),
                    F(coat), F(coat_roughness), F(coat_ior), F(translucency), F(translucency_texture), F(specular_tint),
-                   F(absorption));
+                   F(absorption), F(diffuse_roughness), F(diffuse_roughness_texture));
 LUMICUT_DESCRIPTOR(lumicut_mesh, F(struct_size), F(mask), F(positions), F(normals), F(uvs), F(vertex_count), F(indices),
                    F(triangle_count), F(materials), F(transforms), F(transform_count), F(material), F(group),
                    F(attributes), F(attribute_count), F(not_lit_by), F(not_blocking), F(receivers), F(blockers));

@@ -18,13 +18,15 @@ struct Material {
   float shininess = 0.0f;
   LobeModel lobe = LobeModel::blinn;
   bool oren_nayar = false;   // not of GGX: bsdf/oren_nayar.h, of the slope `roughness`
-  bool facets_once = false;  // of that, and of GGX: what facets reflect more than once is lost
+  bool facets_once = false;  // of that, and of GGX's lobe: what facets reflect more than once is lost
   // GGX alone: `diffuse` is the base colour, `specular` multiplies the dielectric's reflectance at normal incidence.
   // Without `fresnel` it is the lobe's own reflectance at every angle, beside Lambert's `diffuse`: no metal, no glass.
   bool fresnel = true;
-  bool bright_lobe = false;    // that makes the lobe brighter, instead of leaving evenly
-  bool burley = false;         // the diffuse part; and the lobes above take nothing from it
-  Rgb specular_tint{1, 1, 1};  // of metal at 82 degrees, and of what glass reflects
+  bool bright_lobe = false;        // that makes the lobe brighter, instead of leaving evenly
+  bool burley = false;             // the diffuse part; and the lobes above take nothing from it
+  float diffuse_roughness = 0.0f;  // of the diffuse part, as of `oren_nayar`: the slope
+  bool diffuse_once = false;       // of that
+  Rgb specular_tint{1, 1, 1};      // of metal at 82 degrees, and of what glass reflects
   float roughness = 0.5f, metallic = 0.0f, ior = 1.5f, transmission = 0.0f;
   float coat = 0.0f, coat_roughness = 0.0f, coat_ior = 1.5f;  // a clear layer over all of this; `coat`: its share
   bool shadows_pass = false;  // light goes straight through the glass, though the camera sees it bent
@@ -40,14 +42,15 @@ struct Material {
   float bump_strength = 1.0f, bump_distance = 1.0f;  // the distance in world units that a height of 1 stands out
   int32_t height_texture = -1;
   int32_t roughness_texture = -1, metallic_texture = -1;  // GGX alone; green and blue, as glTF packs them
+  int32_t diffuse_roughness_texture = -1;                 // GGX alone; green
   int32_t diffuse_texture = -1, specular_texture = -1, opacity_texture = -1, emission_texture = -1;
   int32_t translucency_texture = -1;
   LUMICUT_FIELDS(Material, diffuse, specular, translucency, shininess, lobe, oren_nayar, facets_once, fresnel,
-                 bright_lobe, burley, specular_tint, roughness, metallic, ior, transmission, coat, coat_roughness,
-                 coat_ior, shadows_pass, open_glass, absorption, bump_shadows, holdout, opacity, emission,
-                 emit_both_sides, normal_strength, normal_texture, bump_strength, bump_distance, height_texture,
-                 roughness_texture, metallic_texture, diffuse_texture, specular_texture, opacity_texture,
-                 emission_texture, translucency_texture)
+                 bright_lobe, burley, diffuse_roughness, diffuse_once, specular_tint, roughness, metallic, ior,
+                 transmission, coat, coat_roughness, coat_ior, shadows_pass, open_glass, absorption, bump_shadows,
+                 holdout, opacity, emission, emit_both_sides, normal_strength, normal_texture, bump_strength,
+                 bump_distance, height_texture, roughness_texture, metallic_texture, diffuse_roughness_texture,
+                 diffuse_texture, specular_texture, opacity_texture, emission_texture, translucency_texture)
 
   // Whether light that goes straight through its glass is absorbed there.
   bool absorbs_straight() const { return shadows_pass && max_component(absorption) > 0.0f; }

@@ -253,6 +253,7 @@ void Scene::check_references() const {
                     " stands beside a normal_texture that is a program");
     check_texture(materials_[i].roughness_texture, i, "roughness_texture", true);
     check_texture(materials_[i].metallic_texture, i, "metallic_texture", true);
+    check_texture(materials_[i].diffuse_roughness_texture, i, "diffuse_roughness_texture", true);
   }
   for (size_t i = 0; i < lights_.size(); ++i)
     if (lights_[i].profile != 0 && profiles_.find(lights_[i].profile) == nullptr)
@@ -590,9 +591,13 @@ BsdfParameters Scene::bsdf_parameters(uint32_t material, Vec2f uv, const Surface
   p.diffuse = texel(m.diffuse, m.diffuse_texture), p.specular = texel(m.specular, m.specular_texture);
   p.translucency = texel(m.translucency, m.translucency_texture);
   p.exponent = m.shininess;
-  if (m.oren_nayar) p.slope = m.roughness;
-  p.facets_once = m.facets_once;
-  if (m.lobe != LobeModel::ggx) return p;
+  if (m.lobe != LobeModel::ggx) {
+    if (m.oren_nayar) p.slope = m.roughness, p.diffuse_once = m.facets_once;
+    return p;
+  }
+  p.facets_once = m.facets_once, p.diffuse_once = m.diffuse_once;
+  p.slope = m.diffuse_roughness;
+  if (m.diffuse_roughness_texture >= 0) p.slope *= share(color(m.diffuse_roughness_texture).y);
   p.fresnel = m.fresnel, p.bright_lobe = m.bright_lobe, p.additive = m.burley, p.specular_tint = m.specular_tint;
   float roughness = m.roughness;
   if (m.roughness_texture >= 0) roughness *= share(color(m.roughness_texture).y);

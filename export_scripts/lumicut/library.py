@@ -24,7 +24,7 @@ UINT8, FLOAT32 = 0, 1
 ROBUST, FAST = 1, 2  # of SceneDesc.robust
 SRGB, CLAMP, NEAREST, BY_VIEW, BLEND_STORED = 1, 2, 4, 8, 16
 EMIT_BOTH_SIDES, PHONG, GGX, NO_FRESNEL, BURLEY, SHADOWS_PASS, HOLDOUT, BUMP_SHADOWS = 1, 2, 4, 8, 16, 32, 64, 128
-OREN_NAYAR, FACETS_ONCE, OPEN_GLASS, BRIGHT_LOBE = 256, 512, 1024, 2048
+OREN_NAYAR, FACETS_ONCE, OPEN_GLASS, BRIGHT_LOBE, DIFFUSE_ONCE = 256, 512, 1024, 2048, 4096
 POINT, SPOT, RECTANGLE, DISK, SUN = range(5)
 FACING_DISK, NO_SHADOWS = 1, 2  # of Light.flags
 EQUIRECTANGULAR, FISHEYE_EQUIDISTANT, FISHEYE_EQUISOLID, MIRROR_BALL, EQUIANGULAR_CUBE = 1, 2, 3, 4, 5  # of Camera.panorama
@@ -167,7 +167,7 @@ class Material(Descriptor):
                 ("roughness_texture", c_int32), ("metallic_texture", c_int32), ("coat", c_float),
                 ("coat_roughness", c_float), ("coat_ior", c_float), ("translucency", c_float * 3),
                 ("translucency_texture", c_int32), ("specular_tint", c_float * 3),
-                ("absorption", c_float * 3)]
+                ("absorption", c_float * 3), ("diffuse_roughness", c_float), ("diffuse_roughness_texture", c_int32)]
 
 
 class Mesh(Descriptor):
@@ -284,7 +284,7 @@ VPL, VPL_ORIGIN, POINT_TO_SHADE, RAY, RAYHIT, FIRST_HIT = map(np.dtype, (Vpl, Vp
 
 # Bytes that the C compiler gives each structure; load() refuses to go on where ctypes lays one out differently.
 SIZES = {Ray: 48, Hit: 32, Rayhit: 80, Vpl: 64, Point: 64, DeviceDesc: 32, Status: 64, AccelDesc: 80, AccelInfo: 80,
-         AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 40, Material: 164, Mesh: 120, Light: 136, Profile: 40,
+         AccelNodeInfo: 44, Trace: 32, SceneDesc: 24, Texture: 40, Material: 172, Mesh: 120, Light: 136, Profile: 40,
          Environment: 68, Camera: 128, IntegratorInfo: 88, ParamInfo: 72, RenderDesc: 88, Tile: 20, ChannelInfo: 24}
 
 RESULT = c_int32

@@ -236,7 +236,11 @@ class Writer:
             if m.coat > 0:
                 for key in ("coat", "coat_roughness", "coat_ior"):
                     out[key] = numbers([getattr(m, key)])[0]
-            for key in ("roughness_texture", "metallic_texture"):
+            if m.diffuse_roughness > 0:
+                out["diffuse_roughness"] = numbers([m.diffuse_roughness])[0]
+            if m.flags & library.DIFFUSE_ONCE:
+                out["diffuse_facets"] = "once"
+            for key in ("roughness_texture", "metallic_texture", "diffuse_roughness_texture"):
                 if getattr(m, key):
                     out[key] = self.texture(getattr(m, key), "vectors")
         else:

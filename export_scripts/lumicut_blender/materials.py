@@ -90,7 +90,7 @@ class Surface:
     rough_picture: Value = None  # `roughness` is its mean then
     by_place: ByPlace = None
     clearcoat: ClearCoat = None
-    slope: float = 0.0    # of the diffuse part's facets (Oren-Nayar)
+    slope: Value = ZERO   # of the diffuse part's facets (Oren-Nayar)
     facets: int = 0       # flags of what metal's facets reflect again
     burley: bool = False  # the diffuse part, of which coats take nothing
     tint: tuple = None    # of metal's edge, of what glass reflects
@@ -204,7 +204,7 @@ class SurfaceReader(Evaluator):
                 self.note("metallic", "Textures taken as their mean")
         if da > 0 and db > 0 and a.burley != b.burley:
             self.note("", "Diffuse parts of two models in one material, taken as the stronger one's")
-        slope = (da * a.slope + db * b.slope) / (da + db) if da + db > 0 else 0.0
+        slope = self.add(*(self.multiply(Value(d / (da + db)), s.slope) for d, s in ((da, a), (db, b)))) if da + db > 0 else ZERO
         coats = [(h.scalar(), s.clearcoat) for h, s in ((f, a), (g, b)) if s.clearcoat and h.scalar() > 0]
         clearcoat = None
         if coats:
@@ -256,6 +256,8 @@ class SurfaceReader(Evaluator):
             return dataclasses.replace(b, opacity=ONE)
         if b.clear:
             return dataclasses.replace(a, opacity=ONE)
+        if bpy.app.version >= (4, 3, 0) and any(luminance(s.slope) > 0 and luminance(other.gloss) > 0 for s, other in ((a, b), (b, a))):
+            self.note("", "Rough diffuse with gloss added, whose facets are taken as brighter")
         return dataclasses.replace(self.weighted(ONE, a, ONE, b), opacity=a.opacity)
 
     # ---- Closures -----------------------------------------------------------------------------------------------
@@ -350,8 +352,10 @@ class SurfaceReader(Evaluator):
 
     def closure_bsdf_diffuse(self, node, stack):
         self.bumps(node, stack)
-        slope = min(1.0, max(0.0, self.number(node.inputs["Roughness"], stack, "roughness")))
-        return Surface(diffuse=self.value(node.inputs["Color"], stack), slope=slope)
+        return Surface(diffuse=self.value(node.inputs["Color"], stack), slope=self.slope(node.inputs["Roughness"], stack))
+
+    def slope(self, socket, stack):
+        return ZERO if socket is None else self.clipped(self.grey(self.value(socket, stack)))
 
     def closure_bsdf_glossy(self, node, stack):
         self.bumps(node, stack)
@@ -538,6 +542,7 @@ class SurfaceReader(Evaluator):
                 f0, metal, glass = self.multiply(f0, rest), self.multiply(metal, rest), self.multiply(glass, rest)
         return Surface(diffuse=diffuse, metal=self.multiply(metal, metallic), glass=glass,
                        coat=self.multiply(f0, opaque), ior=ior, emission=emission, opacity=opacity, by_place=by_place,
+                       slope=self.slope(node.inputs.get("Diffuse Roughness"), stack),
                        clearcoat=clearcoat, burley=bpy.app.version < (4, 0, 0), tint=tint, facets=facets(node), **gloss)
 
 
@@ -570,6 +575,7 @@ class Converted:
 
 COARSE = "Textures that repeat much against others of their material, at a lower resolution"
 SLOTS = ("diffuse", "specular", "translucency", "emission", "opacity")
+NUMBERS = ("roughness", "metallic", "diffuse_roughness")
 
 
 class Materials:
@@ -673,10 +679,11 @@ class Materials:
         pictures = {}
         factors = {}
         values = self._gloss(surface, name, m)
-        for slot in ("roughness", "metallic"):
+        for slot in NUMBERS:
             if slot in values:
-                pictures[slot] = values[slot].picture
                 setattr(m, slot, float(values[slot].factor[0]))
+                if values[slot].picture is not None:
+                    pictures[slot] = values[slot].picture
         for slot in SLOTS:
             value = values.get(slot) or getattr(surface, slot)
             if value.picture is not None and value.is_zero():
@@ -710,7 +717,7 @@ class Materials:
             pictures["normal"], m.normal_strength = normals
         if heights is not None:
             pictures["height"], m.bump_distance, m.bump_strength = heights
-        every = [slot for slot in (*SLOTS, "roughness", "metallic", "normal", "height")
+        every = [slot for slot in (*SLOTS, *NUMBERS, "normal", "height")
                  if slot in pictures and not pictures[slot].is_by_view() and not isinstance(pictures[slot], ProgramPicture)]
         together = aligned([pictures[slot] for slot in every], lambda p: self.report.note(f"{name} ({p})", COARSE))
         if together is None or "normal" in every and not together[0].mapping.is_upright():  # which tangents follow
@@ -738,8 +745,8 @@ class Materials:
         return Converted(name, m, pictures, mapping, surface.by_ray, source)
 
     def _gloss(self, surface, name, m):
-        """Values of the slots diffuse and specular, and of roughness and metallic where they are pictures; flags and
-        numbers into `m`."""
+        """Values of the slots diffuse and specular, of roughness and metallic where they are pictures, and of the diffuse part's
+        roughness; flags and numbers into `m`."""
         evaluator = Evaluator(name, self.images, self.report)
         add = evaluator.add
         # A lobe without Fresnel stands beside Lambert alone; beside other shaders it counts as metal.
@@ -749,13 +756,13 @@ class Materials:
         d, metal, glass = luminance(surface.diffuse), luminance(surface.metal), luminance(surface.glass)
         coat, diffuse = surface.coat, surface.diffuse
         matt = metal + glass + luminance(coat) + luminance(surface.gloss) <= 0 and surface.clearcoat is None
-        if matt and not (surface.burley and d > 0):
-            if surface.slope > 0 and d > 0:
-                m.flags |= library.OREN_NAYAR | (0 if bpy.app.version >= (4, 3, 0) else library.FACETS_ONCE)
-                m.roughness = surface.slope
+        once = bpy.app.version < (4, 3, 0)
+        grooved = luminance(surface.slope) > 0 and d > 0
+        if matt and not (d > 0 and (surface.burley or surface.slope.picture is not None)):
+            if grooved:
+                m.flags |= library.OREN_NAYAR | (library.FACETS_ONCE if once else 0)
+                m.roughness = float(surface.slope.factor[0])
             return {"diffuse": diffuse, "specular": ZERO}
-        if surface.slope > 0 and d > 0:
-            self.report.note(name, "Rough diffuse (Oren-Nayar) mixed with gloss, taken as Lambert")
         m.flags |= library.GGX | surface.facets
         if surface.burley and luminance(surface.gloss) <= 0:
             m.flags |= library.BURLEY
@@ -766,6 +773,9 @@ class Materials:
             m.coat, m.coat_roughness, m.coat_ior = c.share, self._raised(c.roughness, name), c.ior
         least = roughness_of(self.max_shininess)
         pictured = {}
+        if grooved and not m.flags & library.BURLEY:
+            m.flags |= library.DIFFUSE_ONCE if once else 0
+            pictured["diffuse_roughness"] = surface.slope
         if surface.rough_picture is not None:
             value = surface.rough_picture
             texels = None if isinstance(value.picture, ProgramPicture) else value.texels()

@@ -28,9 +28,9 @@ inline void check_scene(const io::SceneData& scene) {
   const auto textures = static_cast<int32_t>(scene.textures.size());
   for (const io::Material& material : scene.materials) {
     const lumicut_material& m = material.values;
-    for (const int32_t t :
-         {m.diffuse_texture, m.specular_texture, m.opacity_texture, m.emission_texture, m.normal_texture,
-          m.height_texture, m.roughness_texture, m.metallic_texture, m.translucency_texture})
+    for (const int32_t t : {m.diffuse_texture, m.specular_texture, m.opacity_texture, m.emission_texture,
+                            m.normal_texture, m.height_texture, m.roughness_texture, m.metallic_texture,
+                            m.translucency_texture, m.diffuse_roughness_texture})
       if (t < 0 || t > textures) finding("a texture that is not there");
   }
   for (const lumicut_light& light : scene.lights)

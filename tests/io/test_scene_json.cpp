@@ -392,6 +392,11 @@ TEST(SceneJson, GgxHasItsOwnParameters) {
   const lumicut_material clay = read_scene(folder.write("scene.json", scene.dump())).materials.back().values;
   EXPECT_EQ(clay.flags, uint32_t{LUMICUT_OREN_NAYAR | LUMICUT_FACETS_ONCE});
   EXPECT_EQ(clay.roughness, 0.25f);
+  scene["materials"].push_back(
+      {{"name", "glazed"}, {"model", "ggx"}, {"diffuse_roughness", 0.75}, {"diffuse_facets", "once"}});
+  const lumicut_material glazed = read_scene(folder.write("scene.json", scene.dump())).materials.back().values;
+  EXPECT_EQ(glazed.flags, uint32_t{LUMICUT_GGX | LUMICUT_DIFFUSE_ONCE});
+  EXPECT_EQ(glazed.diffuse_roughness, 0.75f);
   for (const auto& [word, flag] :
        {std::pair{"even", 0u}, {"lobe", uint32_t{LUMICUT_BRIGHT_LOBE}}, {"none", uint32_t{LUMICUT_FACETS_ONCE}}}) {
     scene["materials"].push_back({{"name", word}, {"model", "ggx"}, {"multiple_scattering", word}});
@@ -402,6 +407,14 @@ TEST(SceneJson, GgxHasItsOwnParameters) {
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"multiple_scattering", "lobes"}}),
             {"multiple_scattering", "lobes"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"oren_nayar", "often"}}), {"oren_nayar", "not of the model"});
+  expect_in(wrong({{"name", "a"}, {"diffuse_roughness", 0.5}}), {"diffuse_roughness", "\"ggx\" alone"});
+  expect_in(wrong({{"name", "a"}, {"diffuse_roughness_texture", "a.exr"}}),
+            {"diffuse_roughness_texture", "\"ggx\" alone"});
+  expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"diffuse_roughness", 1.5}}), {"diffuse_roughness", "1.5"});
+  expect_in(wrong({{"name", "a"}, {"diffuse_facets", "once"}}), {"diffuse_facets", "\"ggx\" alone"});
+  expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"diffuse_facets", "twice"}}), {"diffuse_facets", "twice"});
+  expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"burley", true}, {"diffuse_roughness", 0.5}}),
+            {"diffuse_roughness", "must be 0 where \"burley\""});
   expect_in(wrong({{"name", "a"}, {"shadows_pass", true}}), {"shadows_pass", "\"ggx\" alone"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"shadows_pass", true}}),
             {"shadows_pass", "needs a \"transmission\" above 0"});
@@ -444,6 +457,7 @@ TEST(SceneJson, CoatsBumpsAndTexturesOfNumbersAreRead) {
                          {"coat_ior", 1.6},
                          {"roughness_texture", "a.exr"},
                          {"metallic_texture", {{"file", "a.exr"}, {"nearest", true}}},
+                         {"diffuse_roughness_texture", "a.exr"},
                          {"height_texture", "a.exr"},
                          {"bump_distance", -2},
                          {"bump_strength", 0.5}},
@@ -454,6 +468,7 @@ TEST(SceneJson, CoatsBumpsAndTexturesOfNumbersAreRead) {
   EXPECT_EQ(m.coat_roughness, 0.2f);
   EXPECT_EQ(m.coat_ior, 1.6f);
   EXPECT_EQ(m.roughness_texture, m.height_texture) << "read once";
+  EXPECT_EQ(m.diffuse_roughness_texture, m.roughness_texture);
   EXPECT_NE(m.roughness_texture, m.metallic_texture);
   EXPECT_FLOAT_EQ(m.bump_distance, -0.02f) << "a length: in the file's unit";
   EXPECT_EQ(m.bump_strength, 0.5f);

@@ -158,6 +158,12 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
       {[](M& m) { m.bump_strength = -1; }, "lumicut_material[3].bump_strength: -1 is not in [0, 10]"},
       {[](M& m) { m.roughness_texture = -1; }, "lumicut_material[3].roughness_texture: -1"},
       {[](M& m) { m.metallic_texture = -1; }, "lumicut_material[3].metallic_texture: -1"},
+      {[](M& m) { m.diffuse_roughness_texture = -1; }, "lumicut_material[3].diffuse_roughness_texture: -1"},
+      {[](M& m) { m.diffuse_roughness = 1.5f; }, "lumicut_material[3].diffuse_roughness: 1.5 is not in [0, 1]"},
+      {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_BURLEY, m.diffuse_roughness = 0.5f; },
+       "lumicut_material[3].diffuse_roughness: must be 0 with LUMICUT_BURLEY"},
+      {[](M& m) { m.flags = LUMICUT_DIFFUSE_ONCE; },
+       "lumicut_material[3].flags: holds LUMICUT_DIFFUSE_ONCE without LUMICUT_GGX"},
       {[](M& m) { m.coat = 1.5f; }, "lumicut_material[3].coat: 1.5 is not in [0, 1]"},
       {[](M& m) { m.coat_roughness = -0.5f; }, "lumicut_material[3].coat_roughness: -0.5 is not in [0, 1]"},
       {[](M& m) { m.coat_ior = 0.5f; }, "lumicut_material[3].coat_ior: 0.5 is not in [1, 10]"},
@@ -184,7 +190,7 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
        "lumicut_material[3].flags: holds LUMICUT_OPEN_GLASS without LUMICUT_SHADOWS_PASS"},
       {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_SHADOWS_PASS, m.transmission = 0; },
        "lumicut_material[3].transmission: must be above 0 with LUMICUT_SHADOWS_PASS"},
-      {[](M& m) { m.flags = 4096; }, "lumicut_material[3].flags: 4096", LUMICUT_UNSUPPORTED},
+      {[](M& m) { m.flags = 8192; }, "lumicut_material[3].flags: 8192", LUMICUT_UNSUPPORTED},
   };
   for (const auto& w : wrongs) {
     auto m = materials();

@@ -79,7 +79,7 @@ size_t expect_every_field_counts(const T& value) {
   }
 }
 
-TEST(Identity, EveryFieldOfAMaterialCounts) { EXPECT_EQ(expect_every_field_counts(Material{}), 50u); }
+TEST(Identity, EveryFieldOfAMaterialCounts) { EXPECT_EQ(expect_every_field_counts(Material{}), 53u); }
 TEST(Identity, EveryFieldOfALightCounts) { EXPECT_EQ(expect_every_field_counts(Light{}), 32u); }
 TEST(Identity, EveryFieldOfAnEnvironmentCounts) { EXPECT_EQ(expect_every_field_counts(Environment{}), 18u); }
 TEST(Identity, EveryFieldOfACameraCounts) { EXPECT_EQ(expect_every_field_counts(Camera{}), 31u); }

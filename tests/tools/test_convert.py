@@ -54,14 +54,15 @@ def json_scene(path):
                                                                              "shininess": 33.3, "diffuse": [0.2, 0.1, 0.7]},
                       {"name": "glass", "model": "ggx", "transmission": 1, "shadows_pass": True, "open_glass": True, "ior": 1.45, "absorption": [0.1, 0.2, 0.3],
                        "specular_tint": [1, 0.9, 0.8]},
-                      {"name": "cloth", "model": "ggx", "burley": True, "multiple_scattering": "lobe", "translucency": [0.1, 0.2, 0.1], "coat": 0.5, "coat_roughness": 0.2}],
+                      {"name": "cloth", "model": "ggx", "burley": True, "multiple_scattering": "lobe", "translucency": [0.1, 0.2, 0.1], "coat": 0.5, "coat_roughness": 0.2},
+                      {"name": "glazed", "model": "ggx", "diffuse_roughness": 0.6, "diffuse_facets": "once", "diffuse_roughness_texture": {"program": "tint"}}],
         "meshes": [{"positions": square, "quads": [[0, 1, 2, 3]], "material": "a", "transform": {"scale": 3}, "shadow_catcher": True,
                     "attributes": [{"name": "colour", "domain": "vertices", "components": 3, "values": [1, .5, .2, .3, 1, 1, .2, .2, 1, 1, 1, 1]}]},
                    {"positions": square, "quads": [[0, 1, 2, 3]], "material": "a 2", "hidden_from": ["camera", "glossy"], "group": 3,
                     "normals": [[0.1, 0.2, 0.9], [0, 0, 1], [0.3, 0, 1], [0, 0.1, 1]],
                     "instances": [{"rotate": {"axis": [1, 2, 3], "degrees": 77}, "translate": [0, 1, 1]}, {"scale": [1, -2, 1]}]}] +
                   [{"positions": square, "quads": [[0, 1, 2, 3]], "material": name, "transform": {"scale": 0.4, "translate": [x, 0, 1]}}
-                   for name, x in (("glass", -0.5), ("cloth", 0.6))],
+                   for name, x in (("glass", -0.5), ("cloth", 0.6), ("glazed", 1.7))],
         "lights": [{"type": "point", "position": [0, 0, 3], "direction": [0.1, 0.2, -0.9], "ies": "lamp.ies", "value": 0.7, "rotation": 20},
                    {"type": "spot", "position": [1, 1, 3], "direction": [0.3, 0.123, -0.77], "ies": "lamp.ies", "value": 0.7, "angle": 50},
                    {"type": "spot", "position": [1, 1, 3], "direction": [0.3, 0.123, -0.77], "value": 3, "unit": "watt", "angle": 50, "blend": 0.3,

@@ -149,6 +149,8 @@ typedef struct lumicut_material {
   float specular_tint[3];      /* 0..1: of metal at 82 degrees, over its colour there; of what glass reflects; all 0: not given, taken as 1 */
   float absorption[3];         /* 0 or above, 1/length: light inside closed glass falls by exp(-absorption times the way); shadow rays that pass
                                   straight know the mean thickness of the mesh's absorbing faces alone, 2 volume / area */
+  float diffuse_roughness;     /* 0..1, slope of the diffuse part's facets, as of LUMICUT_OREN_NAYAR; 0: Lambert's. Not with LUMICUT_BURLEY */
+  int32_t diffuse_roughness_texture; /* 1 + index; 0: none. Linear, its green multiplies */
 } lumicut_material;
 enum {
   LUMICUT_EMIT_BOTH_SIDES = 1,
@@ -164,6 +166,8 @@ enum {
                                 than once is lost. Of rough metal it leaves evenly otherwise */
   LUMICUT_BRIGHT_LOBE = 2048, /* with LUMICUT_GGX: of rough metal, and of lobes without Fresnel, it makes the lobe brighter instead, as
                                  in Blender since 4.0; eye and light paths differ a little then, as no reciprocal lobe does that */
+  LUMICUT_DIFFUSE_ONCE = 4096, /* with LUMICUT_GGX: what the diffuse part's facets (diffuse_roughness) reflect more than once is lost,
+                                  as in Blender before 4.3 */
   LUMICUT_OPEN_GLASS = 1024, /* with LUMICUT_SHADOWS_PASS: the surface has no second border, so that what lies behind it lies inside
                                 the glass. What goes straight on to there is divided by the square of ior, and what is reflected
                                 there is what glass reflects from inside */
