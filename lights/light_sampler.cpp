@@ -20,7 +20,40 @@ double profile_solid_angle(const Vpl& spot) {
   return 2.0 * std::numbers::pi * width * sum / kCells;
 }
 
+// Of its radius: how far a lamp is from the geometry that its paths are aimed at.
+constexpr float kFar = 10.0f;
+
+// A lamp's own half size, and the solid angle that its light goes into, had it the same intensity everywhere.
+float half_size(const Light& l) { return std::max(l.radius, 0.5f * (length(l.u) + length(l.v))); }
+double spread_solid_angle(const Light& l) {
+  if (l.type == LightType::spot) return 2.0 * std::numbers::pi * (1.0 - static_cast<double>(l.cos_outer));
+  return (l.type == LightType::point ? 4.0 : 1.0) * std::numbers::pi;
+}
+
 }  // namespace
+
+void LightSampler::find_far_lamps(std::vector<double> weights) {
+  Aabb box;
+  for (const SceneExtent::Part& part : scene_.extent().parts()) {
+    const Vec3f half{part.radius, part.radius, part.radius};
+    box.extend(part.center - half), box.extend(part.center + half);
+  }
+  if (box.empty()) return;
+  geometry_ = {box.center(), 0.5f * box.diagonal()};
+  bool any = false;
+  for (size_t i = 0; i < sampler_.size(); ++i) {
+    Emitter& e = sampler_[i];
+    if (e.kind == Kind::triangle || e.kind == Kind::environment || e.kind == Kind::sun) continue;
+    const Light& l = scene_.lights()[e.index];
+    const float distance = length(l.position - geometry_.center);
+    e.far = distance - half_size(l) > kFar * geometry_.radius;
+    if (!e.far) continue;
+    any = true;
+    const double across = static_cast<double>(geometry_.radius) / static_cast<double>(distance);
+    weights[i] *= std::min(1.0, std::numbers::pi * across * across / spread_solid_angle(l));
+  }
+  if (any) path_power_ = DiscreteDistribution(weights);
+}
 
 Rgb light_radiance(const Light& light, const Rgb& value, float cosine) {
   if (!narrowed(light)) return value;
@@ -268,12 +301,14 @@ LightSampler::LightSampler(const Scene& scene, const Progress* progress) : scene
   add_triangles(weights, progress);
   for (Emitter& e : std::span(sampler_).subspan(extended_)) e.found_by_rays = is_found_by_rays(e);
   power_ = DiscreteDistribution(weights);
+  find_far_lamps(std::move(weights));
   const double with_extent = has_extended() ? power_.sum(extended_, sampler_.size()) : 0.0;
   if (environment_share_ > 0.0) environment_share_ /= environment_share_ + with_extent;
 }
 
 size_t LightSampler::bytes() const {
-  return sampler_.capacity() * sizeof(Emitter) + power_.bytes() + texels_.bytes() + delta_.capacity() * sizeof(Vpl);
+  return sampler_.capacity() * sizeof(Emitter) + power_.bytes() + path_power_.bytes() + texels_.bytes() +
+         delta_.capacity() * sizeof(Vpl);
 }
 
 double LightSampler::area_density(double emission) const {

@@ -115,12 +115,18 @@ class LightSampler {
 
  private:
   enum class Kind : uint8_t { point, spot, profile, sphere, soft, rectangle, disk, sun, environment, triangle };
+  // A sphere around all geometry.
+  struct Surroundings {
+    Vec3f center;
+    float radius = 0.0f;  // 0: there is none
+  };
   struct Emitter {
     Kind kind;
     uint32_t index;     // light, or mesh
     uint32_t instance;  // triangle
     uint32_t triangle;
     bool found_by_rays = false;  // of those with extent
+    bool far = false;            // a lamp that all geometry is far from
   };
   struct Surface {  // a sampled point of an emitting surface
     Vec3f position, normal;
@@ -152,6 +158,11 @@ class LightSampler {
   Vec3f sample_environment(double u, double v, Rgb& radiance, float& pdf) const;
   // Direction in which light of a sun travels.
   Vec3f sample_sun(const Light& light, Rng& rng) const;
+  // Marks the lamps that are far from all geometry, whose paths are few by power and aimed at it.
+  void find_far_lamps(std::vector<double> weights);
+  // Where a path of that emitter starts, by its own directions; of a lamp that is far, by where geometry is.
+  EmittedRay ray_from(const Emitter& e, Rng& rng) const;
+  EmittedRay aimed_ray(const Emitter& e, Rng& rng) const;
   EmittedRay distant_ray(const Vec3f& travel, const Rgb& irradiance, Rng& rng) const;
   Vec3f offset(const Surface& s) const { return s.position + s.normal * s.offset; }
 
@@ -162,6 +173,8 @@ class LightSampler {
   double environment_share_ = 0.0;
   bool has_meshes_ = false;
   DiscreteDistribution power_;
+  DiscreteDistribution path_power_;  // in its place for the starts of paths; empty where no lamp is far
+  Surroundings geometry_;
   std::vector<Vpl> delta_;
   std::vector<uint32_t> delta_emitter_;
   // Environment: density over texels, rows weighted by the sine of the polar angle.

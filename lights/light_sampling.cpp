@@ -249,11 +249,35 @@ EmittedRay LightSampler::distant_ray(const Vec3f& travel, const Rgb& irradiance,
   return {through - travel * behind, travel, irradiance * static_cast<float>(1.0 / density), 0};
 }
 
-EmittedRay LightSampler::sample_ray(Rng& rng, const DiscreteDistribution* chances) const {
-  const DiscreteDistribution& choice = chances != nullptr ? *chances : power_;
-  const size_t i = choice.sample((static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32);
-  const Emitter& e = sampler_[i];
-  const auto weight = static_cast<float>(1.0 / choice.pmf(i));
+// Through a place of the disk, across the way from the lamp, that stands before all geometry from there. It sets out near
+// by: far coordinates are coarse.
+EmittedRay LightSampler::aimed_ray(const Emitter& e, Rng& rng) const {
+  const Light& l = scene_.lights()[e.index];
+  Vpl v;
+  v.position = l.position, v.intensity = l.value, v.group = l.group;
+  if (e.kind == Kind::spot) v = spot_of(l);
+  if (e.kind == Kind::profile) v = profiled(l, *scene_.profiles().find(l.profile));
+  if (e.kind == Kind::soft || e.kind == Kind::sphere || e.kind == Kind::rectangle || e.kind == Kind::disk)
+    v = extended_light(e, 1.0f, rng).vpl;
+  const Vec3f way = geometry_.center - v.position;
+  const float distance = length(way), sine = geometry_.radius / distance;
+  const float radius = geometry_.radius / std::sqrt(1.0f - sine * sine);
+  const float r = radius * std::sqrt(rng.next_float()), phi = 2.0f * kPi * rng.next_float();
+  const Frame f(way / distance);
+  const Vec3f across = f.t * (r * std::cos(phi)) + f.b * (r * std::sin(phi));
+  const Vec3f direction = normalize(way + across);
+  float share = 1.0f;
+  if (v.kind == VplKind::oriented) share = std::max(0.0f, dot(v.normal, direction));
+  if (v.kind == VplKind::spot) share = Falloff(scene_.profiles()).of_spot(v, direction);
+  const float cosine = distance / std::sqrt(distance * distance + r * r);
+  const float turn = radius * cosine / distance;  // the solid angle is π turn² cosine
+  EmittedRay ray{geometry_.center + across - direction * (2.0f * radius), direction,
+                 v.intensity * (share * kPi * turn * turn * cosine), l.group};
+  if (l.facing) ray.disk_centre = l.position, ray.disk_radius = l.radius;
+  return ray;
+}
+
+EmittedRay LightSampler::ray_from(const Emitter& e, Rng& rng) const {
   EmittedRay ray;
   switch (e.kind) {
     case Kind::point: {
@@ -329,6 +353,15 @@ EmittedRay LightSampler::sample_ray(Rng& rng, const DiscreteDistribution* chance
       break;
     }
   }
+  return ray;
+}
+
+EmittedRay LightSampler::sample_ray(Rng& rng, const DiscreteDistribution* chances) const {
+  const DiscreteDistribution& choice = chances != nullptr ? *chances : path_power_.empty() ? power_ : path_power_;
+  const size_t i = choice.sample((static_cast<double>(rng.next_u32()) + 0.5) * 0x1p-32);
+  const Emitter& e = sampler_[i];
+  const auto weight = static_cast<float>(1.0 / choice.pmf(i));
+  EmittedRay ray = e.far ? aimed_ray(e, rng) : ray_from(e, rng);
   ray.flux = ray.flux * weight, ray.emitter = static_cast<uint32_t>(i);
   if (e.kind == Kind::triangle) {
     ray.reach.receivers = scene_.meshes()[e.index].receivers, ray.reach.blockers = scene_.meshes()[e.index].blockers;

@@ -64,6 +64,49 @@ TEST(LightSampler, PowerOfEachLampIsItsAnalyticPower) {
   EXPECT_NEAR(mean_flux(*with_light(spot), 10), 2 * kPi * 0.5, 1e-4);
 }
 
+// By their own directions one path in 10¹² would arrive.
+TEST(LightSampler, PathsOfLampsFarAwayArriveWithTheLightThatTheyGiveThere) {
+  constexpr float kDistance = 1e6f;
+  const Vec3f towards = normalize(Vec3f{0.3f, -0.2f, -0.9f}), place = towards * -kDistance;
+  Light point;
+  point.position = place, point.value = Rgb{1, 1, 1} * (kDistance * kDistance);
+  Light ball = point, spot = point, soft = point, rectangle = point;
+  ball.radius = 10, soft.radius = 10, soft.facing = true;
+  spot.type = LightType::spot, spot.direction = towards, spot.cos_outer = 0.99f;
+  rectangle.type = LightType::rectangle, rectangle.value = Rgb{1, 1, 1} * kDistance;
+  const Frame frame(towards);
+  rectangle.u = frame.t * 1000.0f, rectangle.v = frame.b * 1000.0f;  // u × v: towards
+  for (const Light& lamp : {point, ball, spot, soft, rectangle}) {
+    auto scene = std::make_unique<Scene>(Scene::Config{});
+    scene->set_materials({test::diffuse(0.5f, 0.5f, 0.5f)});
+    Mesh floor;
+    test::add_quad(floor, {-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, 0);
+    scene->add_mesh(std::move(floor));
+    Light near;
+    near.position = {0, 0, 1}, near.value = {1, 1, 1};
+    scene->set_lights({lamp, near});
+    Progress progress;
+    scene->commit(progress);
+    const LightSampler emitters(*scene);
+    constexpr int kPaths = 200000;
+    double arrived = 0;
+    int of_near = 0;
+    for (int i = 0; i < kPaths; ++i) {
+      Rng rng(1, Stage::test, i);
+      const EmittedRay ray = emitters.sample_ray(rng);
+      if (ray.origin == near.position) {
+        ++of_near;
+        continue;
+      }
+      const Vec3f at = ray.origin - ray.direction * (ray.origin.z / ray.direction.z);
+      if (std::max(std::abs(at.x), std::abs(at.y)) < 1) arrived += luminance(ray.flux) / kPaths;
+    }
+    const double irradiance = lamp.type == LightType::rectangle ? 1e6 * kDistance / (double{kDistance} * kDistance) : 1;
+    EXPECT_NEAR(arrived / (4 * irradiance * -towards.z), 1, 0.02) << static_cast<int>(lamp.type) << " " << lamp.radius;
+    EXPECT_GT(of_near, kPaths / 20) << "what arrives of it counts, not what it emits";
+  }
+}
+
 TEST(LightSampler, DirectVplsGiveTheIrradianceOfADiskOnItsAxis) {
   // E = π L r²/(r²+h²) under a disk of radius r at height h.
   Light disk;

@@ -210,7 +210,7 @@ TEST(TraceVpls, DarkSceneGivesNoLightsAndAnOpenSceneEnds) {
   test::add_quad(mesh, {0, 0, 0}, {1e-3f, 0, 0}, {1e-3f, 1e-3f, 0}, {0, 1e-3f, 0}, 0);
   open.add_mesh(mesh);
   Light l;
-  l.position = {0, 0, 100};
+  l.position = {0, 0, 0.01f};
   l.value = {1, 1, 1};
   open.set_lights({l});
   open.commit(progress);
