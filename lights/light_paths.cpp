@@ -95,8 +95,8 @@ LightPaths trace_paths(const Scene& scene, const LightSampler& emitters, const V
       const bool stopped = path.stopped_by(mesh);
       const bool lights =
           (mesh.mask & kDiffuseRay) != 0 && (!path.first() || in_set(mesh.not_lit_by, path.reach.receivers));
-      if (stopped && !lights) continue;  // and nobody sees it
       const SurfaceInteraction at = scene.interaction(rays[i]);
+      if (stopped && !lights && !at.bsdf.passes_straight()) continue;  // nobody sees it
       path.flux *= at.bsdf.transmittance_to(at.t, path.absorption);
       if (!stopped) {
         // Lit, and no shadow behind it: half of the paths stay, half go on.
@@ -126,7 +126,7 @@ LightPaths trace_paths(const Scene& scene, const LightSampler& emitters, const V
         }
         vpls.push_back({ids[i], path.emitter, light, lobe});
       };
-      if (!path.first() || path.reach.lights(kDiffuseRay)) {
+      if (lights && (!path.first() || path.reach.lights(kDiffuseRay))) {
         const Rgb received = path.flux * (lit * lit_by_shading_normal(at));
         if (path.thrown && max_component(at.bsdf.even_color()) > 0.0f)
           found.glints.push_back({at.position, path.origin, luminance(received)});
@@ -136,9 +136,11 @@ LightPaths trace_paths(const Scene& scene, const LightSampler& emitters, const V
       }
       const auto next = at.bsdf.scatter(path.rng);
       if (!next) continue;
-      if (path.first() && (next->flags & kStraight) == 0 && !path.reach.lights(lobe_kind(next->flags))) continue;
-      if ((next->flags & kStraight) == 0 && ++path.met >= options.max_depth) continue;
-      if ((next->flags & kStraight) == 0) {
+      const bool straight = (next->flags & kStraight) != 0;
+      if (straight ? !stopped : !lights) continue;  // the half that goes on has passed; what is not lit throws nothing
+      if (path.first() && !straight && !path.reach.lights(lobe_kind(next->flags))) continue;
+      if (!straight && ++path.met >= options.max_depth) continue;
+      if (!straight) {
         path.kind = kDiffuseRay, path.flux *= lit, path.disk_radius = 0.0f;
         path.thrown = (next->flags & (kSpecular | kGlossy)) != 0;
       }

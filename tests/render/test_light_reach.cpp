@@ -153,6 +153,34 @@ TEST(LightReach, WhatIsNoBlockerThrowsNoShadow) {
   }
 }
 
+// Light paths went through such a pane twice, as one that it does not stop and as one that glass lets pass; or ended there.
+TEST(LightReach, BouncedLightPassesGlassThatIsNoBlockerOrNoReceiverOnce) {
+  Material closed = test::diffuse(1, 1, 1);
+  closed.lobe = LobeModel::ggx, closed.specular = {1, 1, 1}, closed.roughness = 0, closed.transmission = 1;
+  closed.shadows_pass = true;
+  Material open = closed;
+  open.open_glass = true;
+  for (const Material& glass : {closed, open})
+    for (const auto& [blockers, receivers] : {std::pair{2u, 0u}, {0u, 3u}}) {
+      Scene scene{Scene::Config{}};  // a room beneath a pane, and the lamp above it
+      scene.set_materials({test::diffuse(0.7f, 0.7f, 0.7f), glass});
+      Mesh room, pane;
+      test::add_box(room, {-1, -1, -1}, {1, 1, 1}, 0, true);
+      test::add_quad(pane, {-1, -1, 0.6f}, {1, -1, 0.6f}, {1, 1, 0.6f}, {-1, 1, 0.6f}, 1);
+      pane.not_blocking = 2, pane.not_lit_by = 4;
+      scene.add_mesh(std::move(room)), scene.add_mesh(std::move(pane));
+      Light lamp = panel();
+      lamp.position = {0, 0, 0.9f}, lamp.reach.blockers = blockers, lamp.reach.receivers = receivers;
+      scene.set_lights({lamp});
+      test::commit_seen_from(scene, {0, -0.9f, -0.2f}, 1.0f);
+      const double paths = mean(render(scene, "path_tracer"));
+      double lights = 0;
+      for (const char* seed : {"1", "2", "3", "4", "5", "6", "7", "8"})
+        lights += mean(render(scene, "exhaustive", {{"compensate", "1"}, {"seed", seed}})) / 8;
+      EXPECT_NEAR(lights / paths, 1, 0.05) << blockers << " " << glass.open_glass;
+    }
+}
+
 TEST(LightReach, EveryMethodKnowsIt) {
   for (const IntegratorEntry& entry : integrators()) {
     const double dark = mean(render(*floor(bulb(kGlossyRay), test::diffuse(0.5f, 0.5f, 0.5f)), entry.id));
