@@ -66,7 +66,7 @@ Bsdf::Bsdf(const BsdfParameters& parameters, const SurfaceView& view)
   p.ior = colors_.ior;
   if (colors_.alpha >= kLeastAlpha) {
     p.specular = colors_.specular, p.grazing = colors_.grazing;
-    if (parameters.bright_lobe) brighten_lobe(colors_, cosine, p.specular, p.grazing);
+    if (parameters.bright_lobe) brighten_lobe(colors_, parameters.fresnel, cosine, p.specular, p.grazing);
   }
   if (parameters.coat > 0.0f) {
     const ClearCoat coat = clear_coat(parameters, cosine);

@@ -19,7 +19,6 @@ struct GgxColors {
   Rgb specular;                // F0 of metal and dielectric together
   Rgb grazing;                 // F90 of both
   float alpha, ior;            // of the lobe
-  bool bare;                   // without Fresnel
 
   // Whether rays follow its lobe, without regard to a clear coat.
   bool is_specular() const { return alpha < kLeastAlpha || clear > 0.0f; }
@@ -54,7 +53,7 @@ inline GgxColors ggx_colors(const BsdfParameters& m) {
   c.opaque = (1.0f - c.metal) * (1.0f - m.transmission);
   c.alpha = m.alpha;
   if (!m.fresnel) {
-    c.metal = c.clear = 0.0f, c.opaque = 1.0f, c.bare = true;
+    c.metal = c.clear = 0.0f, c.opaque = 1.0f;
     c.specular = c.grazing = m.specular, c.ior = kMetalIndex;
     return c;
   }
@@ -77,18 +76,18 @@ struct GgxDiffuse {
 };
 
 // What gloss without Fresnel leaves of a white surface was mixed with the base: the base's own colour.
-inline Rgb base_color(const GgxColors& c) {
-  return c.bare ? c.base / std::max(1e-3f, 1.0f - max_component(c.specular)) : c.base;
+inline Rgb base_color(const GgxColors& c, bool fresnel) {
+  return fresnel ? c.base : c.base / std::max(1e-3f, 1.0f - max_component(c.specular));
 }
 
 inline Rgb mean_reflectance(const Rgb& f0, const Rgb& f90) { return f0 + (f90 - f0) * kMeanShare; }
 
 // Adds to a lobe, seen at `cosine`, what facets of rough metal reflect again of what single reflection loses, as if all of it
 // kept to the lobe's directions: bright_lobe. [Kulla, Conty 2017; Turquin 2019]
-inline void brighten_lobe(const GgxColors& c, float cosine, Rgb& specular, Rgb& grazing) {
+inline void brighten_lobe(const GgxColors& c, bool fresnel, float cosine, Rgb& specular, Rgb& grazing) {
   const float lost = facet_loss(c.alpha, cosine), mean_lost = mean_facet_loss(c.alpha);
-  const Rgb mean = c.bare ? c.specular : mean_reflectance(c.base, c.metal_edge);
-  const Rgb f0 = c.bare ? c.specular : c.base * c.metal, f90 = c.bare ? c.specular : c.metal_edge * c.metal;
+  const Rgb mean = fresnel ? mean_reflectance(c.base, c.metal_edge) : c.specular;
+  const Rgb f0 = fresnel ? c.base * c.metal : c.specular, f90 = fresnel ? c.metal_edge * c.metal : c.specular;
   for (int k = 0; k < 3; ++k) {
     const float again = mean[k] * (1.0f - mean_lost) / (1.0f - mean[k] * mean_lost) * lost / (1.0f - lost);
     specular[k] += f0[k] * again, grazing[k] += f90[k] * again;
@@ -104,7 +103,7 @@ inline GgxDiffuse ggx_diffuse(const GgxColors& c, const BsdfParameters& m, float
   Rgb coat = c.base * (c.opaque * rest.to_viewer / mean_diffuse_falloff(rest.falloff));
   Grooves facets;
   if (m.slope > 0.0f) {
-    facets = grooves(base_color(c), m.slope, m.diffuse_once, cosine);
+    facets = grooves(base_color(c, m.fresnel), m.slope, m.diffuse_once, cosine);
     coat *= facets.scale;
   }
   if (!(c.metal > 0.0f) || m.facets_once || m.bright_lobe)

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <span>
 
 #include "bsdf/straight_glass.h"
 #include "core/even_sequence.h"
 #include "core/parallel.h"
+#include "geometry/places.h"
 #include "lights/falloff.h"
 #include "lights/light_paths.h"
 
@@ -187,13 +189,11 @@ std::vector<CameraImportance::CameraPoint> CameraImportance::trace_camera_paths(
   for (const Found& part : parts) points.insert(points.end(), part.points.begin(), part.points.end());
   for (size_t side = 0; side < importons_.size(); ++side) {
     Importons& all = importons_[side];
-    std::vector<double> places;
+    std::vector<Vec3f> places;
     for (const Found& part : parts)
-      for (const auto& [place, weight] : part.importons[side]) {
-        for (int k = 0; k < 3; ++k) places.push_back(static_cast<double>(place[k]));
-        all.weights.push_back(weight);
-      }
-    if (!all.weights.empty()) all.tree = std::make_unique<const BallQueryTree>(places, 3, &progress);
+      for (const auto& [place, weight] : part.importons[side]) places.push_back(place), all.weights.push_back(weight);
+    if (!places.empty())
+      all.tree = std::make_unique<const BallQueryTree>(rows_of(places, std::identity{}), 3, &progress);
   }
   return points;
 }
@@ -201,11 +201,9 @@ std::vector<CameraImportance::CameraPoint> CameraImportance::trace_camera_paths(
 float CameraImportance::density(const Vec3f& position, const Vec3f& normal, BallQueryTree::Scratch& scratch) const {
   const Importons& here = importons_[side_of(normal)];
   if (here.tree == nullptr) return 0.0f;
-  const double place[3] = {static_cast<double>(position.x), static_cast<double>(position.y),
-                           static_cast<double>(position.z)};
   std::array<uint32_t, kNeighbours> index;
   std::array<double, kNeighbours> dist2;
-  const size_t found = here.tree->nearest(place, kNeighbours, index.data(), dist2.data(), scratch);
+  const size_t found = here.tree->nearest(row_of(position).data(), kNeighbours, index.data(), dist2.data(), scratch);
   float sum = 0.0f;
   for (size_t k = 0; k < found; ++k) sum += here.weights[index[k]];
   return static_cast<float>(static_cast<double>(sum) / (kPi * std::max(dist2[found - 1], 1e-30)));

@@ -4,21 +4,12 @@
 #include <array>
 #include <cmath>
 
+#include "geometry/places.h"
+
 namespace lumicut {
 
-namespace {
-
-std::vector<double> places_of(std::span<const Vpl> lights) {
-  std::vector<double> places(3 * lights.size());
-  for (size_t i = 0; i < lights.size(); ++i)
-    for (int k = 0; k < 3; ++k) places[3 * i + static_cast<size_t>(k)] = static_cast<double>(lights[i].position[k]);
-  return places;
-}
-
-}  // namespace
-
 LightSpacing::LightSpacing(std::span<const Vpl> lights, float lonely, const Progress* progress)
-    : places_(places_of(lights)), lonely_(lonely), tree_(places_, 3, progress) {}
+    : places_(rows_of(lights, [](const Vpl& v) { return v.position; })), lonely_(lonely), tree_(places_, 3, progress) {}
 
 // The `itself` nearest, 0 or 1, are not counted.
 float LightSpacing::distance(const double* place, size_t itself, BallQueryTree::Scratch& scratch) const {
@@ -31,9 +22,7 @@ float LightSpacing::distance(const double* place, size_t itself, BallQueryTree::
 }
 
 float LightSpacing::at(const Vec3f& position, BallQueryTree::Scratch& scratch) const {
-  const double place[3] = {static_cast<double>(position.x), static_cast<double>(position.y),
-                           static_cast<double>(position.z)};
-  return distance(place, 0, scratch);
+  return distance(row_of(position).data(), 0, scratch);
 }
 
 float LightSpacing::of_light(size_t i, size_t beside, BallQueryTree::Scratch& scratch) const {

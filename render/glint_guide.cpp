@@ -4,31 +4,23 @@
 #include <cmath>
 #include <numbers>
 
+#include "geometry/places.h"
+
 namespace lumicut {
 
 namespace {
 constexpr size_t kNeighbour = 3;
 }
 
-std::vector<double> GlintGuide::places_of(std::span<const Glint> glints) {
-  std::vector<double> places;
-  places.reserve(3 * glints.size());
-  for (const Glint& g : glints)
-    for (int k = 0; k < 3; ++k) places.push_back(static_cast<double>(g.position[k]));
-  return places;
-}
-
 GlintGuide::GlintGuide(std::span<const Glint> glints, const Progress* progress)
-    : glints_(glints), tree_(places_of(glints), 3, progress) {}
+    : glints_(glints), tree_(rows_of(glints, [](const Glint& g) { return g.position; }), 3, progress) {}
 
 GlintGuide::Directions GlintGuide::at(const Vec3f& position, const Vec3f& normal,
                                       BallQueryTree::Scratch& scratch) const {
   Directions d;
-  const double place[3] = {static_cast<double>(position.x), static_cast<double>(position.y),
-                           static_cast<double>(position.z)};
   std::array<uint32_t, kNearest> index;
   std::array<double, kNearest> dist2;
-  const size_t found = tree_.nearest(place, kNearest, index.data(), dist2.data(), scratch);
+  const size_t found = tree_.nearest(row_of(position).data(), kNearest, index.data(), dist2.data(), scratch);
   if (found < 2) return d;
   const double radius2 = 1.0001 * dist2[found - 1];  // the farthest counts a little too
   float sum = 0.0f;

@@ -38,7 +38,6 @@ class GlintGuide {
   Directions at(const Vec3f& position, const Vec3f& normal, BallQueryTree::Scratch& scratch) const;
 
  private:
-  static std::vector<double> places_of(std::span<const Glint> glints);
   std::span<const Glint> glints_;
   BallQueryTree tree_;
 };
