@@ -374,6 +374,10 @@ class SceneReader {
       if (open) open->fail("needs \"shadows_pass\"");
       m.flags &= ~uint32_t{LUMICUT_OPEN_GLASS};
     }
+    if ((m.flags & LUMICUT_OPEN_GLASS) != 0 && *std::max_element(m.absorption, m.absorption + 3) > 0) {
+      if (auto given = object.find("absorption")) given->fail("must be 0 where \"open_glass\" is true");
+      object.need("open_glass").fail("must be false where \"absorption\" is above 0");
+    }
     number("ior", m.ior, 0.1, 10, ggx);
     number("coat", m.coat, 0, 1, ggx);
     number("coat_roughness", m.coat_roughness, 0, 1, ggx);
@@ -821,7 +825,10 @@ class SceneReader {
     } else if (light.type == LUMICUT_POINT || light.type == LUMICUT_SPOT) {
       store(light.position, point(object.need("position")));
       light.radius = static_cast<float>(object.number("radius", 0, 0, largest()) * scale_);
-      if (object.boolean("facing_disk", false)) light.flags |= LUMICUT_FACING_DISK;
+      if (const auto facing = object.find("facing_disk"); facing && facing->boolean()) {
+        if (!(light.radius > 0.0f)) facing->fail("needs a \"radius\" above 0");
+        light.flags |= LUMICUT_FACING_DISK;
+      }
       if (light.type == LUMICUT_SPOT) {
         store(light.direction, direction(object.need("direction")));
         light.angle = static_cast<float>(radians(object.need("angle").number(0.12, 180)));

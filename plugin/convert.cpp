@@ -156,6 +156,8 @@ Material to_material(const lumicut_material& in, uint64_t index) {
   c.range("specular_tint", in.specular_tint, 0.0f, 1.0f);
   if (max_component(vec(in.specular_tint)) > 0.0f) m.specular_tint = vec(in.specular_tint);
   c.not_negative("absorption", in.absorption);
+  if ((in.flags & LUMICUT_OPEN_GLASS) != 0 && max_component(vec(in.absorption)) > 0.0f)
+    c.fail("absorption", "must be 0 with LUMICUT_OPEN_GLASS, behind which shadow rays know no way out");
   m.absorption = vec(in.absorption);
   m.roughness = in.roughness, m.metallic = in.metallic, m.transmission = in.transmission;
   m.ior = in.ior == 0.0f ? 1.5f : in.ior;
@@ -280,6 +282,14 @@ ProfileRef to_profile(const lumicut_profile& in, uint64_t index) {
   }
 }
 
+// Whether a sphere is so small that its radiance, or one over its area, is beyond single precision, with what lamps are
+// multiplied by in the end.
+bool is_point(const Light& light) {
+  constexpr double kRoom = 1e8;
+  const double area = kPi * double{light.radius} * double{light.radius};
+  return std::max(1.0, double{max_component(light.value)}) * kRoom > area * std::numeric_limits<float>::max();
+}
+
 Light to_light(const lumicut_light& in, uint64_t index, const std::vector<ProfileRef>& profiles) {
   const FieldValidator c("lumicut_light", index);
   c.integer("type", in.type, LUMICUT_POINT, LUMICUT_SUN);
@@ -304,6 +314,7 @@ Light to_light(const lumicut_light& in, uint64_t index, const std::vector<Profil
   light.facing = (in.flags & LUMICUT_FACING_DISK) != 0, light.shadows = (in.flags & LUMICUT_NO_SHADOWS) == 0;
   if (light.facing && !point && !spot)
     c.fail("flags", std::string("LUMICUT_FACING_DISK is not for a ") + type_name(in.type));
+  if (light.facing && !(in.radius > 0.0f)) c.fail("radius", "must be above 0 with LUMICUT_FACING_DISK");
   c.flags("mask", in.mask, kAllRays);
   if (in.mask != 0) light.reach.seen_by = in.mask & ~uint32_t{kShadowRay};
   c.integer("receivers", in.receivers, 0, kReceiverSets);
@@ -360,6 +371,7 @@ Light to_light(const lumicut_light& in, uint64_t index, const std::vector<Profil
       c.fail("value", number_text(in.value) + " times color gives " + number_text(value) + ", beyond single precision");
     light.value[k] = static_cast<float>(value);
   }
+  if (point && is_point(light)) light.radius = 0.0f;
   return light;
 }
 

@@ -646,7 +646,10 @@ class Materials:
         values = self.converted[number].values
         if values.transmission <= 0 or values.flags & library.SHADOWS_PASS:
             return number
-        if flags := pane():
+        flags = pane()
+        if flags & library.OPEN_GLASS and any(values.absorption):
+            flags = 0  # of what is below water shadow rays do not know how deep
+        if flags:
             return self._flagged(number, "sheet" if flags & library.OPEN_GLASS else "pane", flags)
         self.report.note(self.converted[number].name, "Glass bodies: lamps do not shine straight through them, their light passes along light paths alone")
         return number

@@ -239,6 +239,18 @@ class Absorption(BesideCycles):
                 self.assertNotIn("olumes", notes)
                 bpy.data.objects.remove(slab)
 
+    def test_below_a_single_sheet_is_water(self):
+        """Which absorbs, so that no light goes straight through its surface: shadow rays know no depth."""
+        h.add_plane(3, material=h.emission(1, (1, 1, 1)))
+        m = h.material("Water")
+        h.shader(m, "ShaderNodeBsdfGlass", Roughness=0.0, IOR=1.3)
+        volume = m.node_tree.nodes.new("ShaderNodeVolumeAbsorption")
+        volume.inputs["Density"].default_value, volume.inputs["Color"].default_value = 1.5, (0.9, 0.5, 0.2, 1)
+        m.node_tree.links.new(volume.outputs[0], next(n for n in m.node_tree.nodes if n.type == "OUTPUT_MATERIAL").inputs["Volume"])
+        h.add_plane(3, 0.4, m)
+        _, notes = self.compare(0.02, cycles=400, samples=64, bounces=8)
+        self.assertIn("Glass bodies", notes)
+
 
 class Layers(BesideCycles):
     def setUp(self):

@@ -111,6 +111,10 @@ TEST(SceneJson, LampsMayFaceWhatTheyLightAndCastNoShadows) {
   scene["image"]["filter"] = "gaussian", scene["image"]["filter_width"] = 2;
   const SceneData data = read_scene(folder.write("scene.json", scene.dump()));
   EXPECT_EQ(data.lights[0].flags, uint32_t{LUMICUT_FACING_DISK});
+  json flat = scene;
+  flat["lights"][0].erase("radius");
+  const std::string path = folder.write("flat.json", flat.dump());
+  expect_in(error_of([&] { read_scene(path); }), {"lights[0].facing_disk", "needs a \"radius\" above 0"});
   EXPECT_EQ(data.lights[1].flags, uint32_t{LUMICUT_NO_SHADOWS});
   EXPECT_EQ(data.filter, uint32_t{LUMICUT_GAUSSIAN});
   EXPECT_EQ(data.filter_width, 2.0f);
@@ -421,6 +425,13 @@ TEST(SceneJson, GgxHasItsOwnParameters) {
   expect_in(wrong({{"name", "a"}, {"open_glass", true}}), {"open_glass", "\"ggx\" alone"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"transmission", 1}, {"open_glass", true}}),
             {"open_glass", "needs \"shadows_pass\""});
+  expect_in(wrong({{"name", "a"},
+                   {"model", "ggx"},
+                   {"transmission", 1},
+                   {"shadows_pass", true},
+                   {"open_glass", true},
+                   {"absorption", {0, 0, 1}}}),
+            {"absorption", "must be 0 where \"open_glass\""});
   expect_in(wrong({{"name", "a"}, {"fresnel", false}}), {"fresnel", "\"ggx\" alone"});
   expect_in(wrong({{"name", "a"}, {"burley", true}}), {"burley", "\"ggx\" alone"});
   expect_in(wrong({{"name", "a"}, {"model", "ggx"}, {"burley", true}, {"fresnel", false}}),

@@ -188,6 +188,10 @@ TEST(Errors, FieldsOfMaterialsAreCheckedByNameAndValue) {
        "lumicut_material[3].flags: holds LUMICUT_SHADOWS_PASS without LUMICUT_GGX"},
       {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_OPEN_GLASS; },
        "lumicut_material[3].flags: holds LUMICUT_OPEN_GLASS without LUMICUT_SHADOWS_PASS"},
+      {[](M& m) {
+         m.flags = LUMICUT_GGX | LUMICUT_SHADOWS_PASS | LUMICUT_OPEN_GLASS, m.transmission = 1, m.absorption[1] = 2;
+       },
+       "lumicut_material[3].absorption: must be 0 with LUMICUT_OPEN_GLASS"},
       {[](M& m) { m.flags = LUMICUT_GGX | LUMICUT_SHADOWS_PASS, m.transmission = 0; },
        "lumicut_material[3].transmission: must be above 0 with LUMICUT_SHADOWS_PASS"},
       {[](M& m) { m.flags = 8192; }, "lumicut_material[3].flags: 8192", LUMICUT_UNSUPPORTED},
@@ -230,6 +234,8 @@ TEST(Errors, FieldsOfLightsAreCheckedByNameAndValue) {
       {[](L& l) { l.texture = 1, l.type = LUMICUT_POINT; }, "lumicut_light[0].texture: a point"},
       {[](L& l) { l.receivers = 33; }, "lumicut_light[0].receivers: 33 is not in [0, 32]"},
       {[](L& l) { l.blockers = 28; }, "lumicut_light[0].blockers: 28 is not in [0, 27]"},
+      {[](L& l) { l.type = LUMICUT_POINT, l.flags = LUMICUT_FACING_DISK; },
+       "lumicut_light[0].radius: must be above 0 with LUMICUT_FACING_DISK"},
       {[](L& l) { l.flags = LUMICUT_FACING_DISK; }, "lumicut_light[0].flags: LUMICUT_FACING_DISK is not for a"},
   };
   for (const auto& w : wrongs) {

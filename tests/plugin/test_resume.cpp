@@ -284,6 +284,7 @@ TEST(Resume, IsRefusedWhereAnythingOfTheSceneIsAnother) { expect_refused({}, sce
 TEST(Resume, IsRefusedWhereASpotIsAnother) {
   Host host;
   host.lights[1].type = LUMICUT_SPOT, host.lights[1].profile = 0, host.lights[1].angle = 1;
+  host.lights[1].radius = 0.05f;
   expect_refused(host, spot_changes());
 }
 

@@ -148,7 +148,8 @@ typedef struct lumicut_material {
   /* LUMICUT_GGX alone */
   float specular_tint[3];      /* 0..1: of metal at 82 degrees, over its colour there; of what glass reflects; all 0: not given, taken as 1 */
   float absorption[3];         /* 0 or above, 1/length: light inside closed glass falls by exp(-absorption times the way); shadow rays that pass
-                                  straight know the mean thickness of the mesh's absorbing faces alone, 2 volume / area */
+                                  straight know the mean thickness of the mesh's absorbing faces alone, 2 volume / area. 0 with
+                                  LUMICUT_OPEN_GLASS */
   float diffuse_roughness;     /* 0..1, slope of the diffuse part's facets, as of LUMICUT_OREN_NAYAR; 0: Lambert's. Not with LUMICUT_BURLEY */
   int32_t diffuse_roughness_texture; /* 1 + index; 0: none. Linear, its green multiplies */
 } lumicut_material;
