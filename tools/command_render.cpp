@@ -75,6 +75,7 @@ std::vector<Channel> choose_channels(const io::Api& api, const std::string& aske
 }
 
 void log_message(void* user, int32_t level, const char* text) {
+  if (std::string_view(text).starts_with("render failed: ")) return;  // which the command says itself
   static_cast<ProgressBar*>(user)->wipe();
   static const char* const kNames[] = {"error", "warning", "info", "debug"};
   print_error("lumicut: {}: {}\n", kNames[std::clamp(level, 0, 3)], text);
@@ -97,6 +98,49 @@ ordered_json statistics(const ordered_json& own, double pixels, double read_seco
   stats["counters"] = own.value("counters", ordered_json::object());
   stats["values"] = own.value("values", ordered_json::object());
   return stats;
+}
+
+// The option that sets what a checkpoint's text names so; else a parameter's.
+std::string option_of(std::string_view name) {
+  constexpr std::pair<std::string_view, std::string_view> kOptions[] = {{"integrator", "-i"},
+                                                                        {"vpls", "--vpls"},
+                                                                        {"seed", "--seed"},
+                                                                        {"width", "--size: width"},
+                                                                        {"height", "--size: height"},
+                                                                        {"samples", "--spp"},
+                                                                        {"crop", "--crop"},
+                                                                        {"denoise", "--denoise"},
+                                                                        {"groups", "--groups"},
+                                                                        {"confidence", "--confidence"},
+                                                                        {"illuminance", "--layers: illuminance"},
+                                                                        {"virtual lights", "--vpl-in"},
+                                                                        {"accel", "--accel, --builder or --rays"}};
+  for (const auto& [known, option] : kOptions)
+    if (known == name) return std::string(option);
+  return {};
+}
+
+// What the library says against a checkpoint, in the command's words.
+std::string refusal_of_checkpoint(std::string text) {
+  const auto cut = [&](std::string_view start) {
+    const bool found = text.starts_with(start);
+    if (found) text.erase(0, start.size());
+    return found;
+  };
+  if (!cut("lumicut_render_desc.checkpoint: ")) return text;
+  if (!cut("it was made for another scene, size, integrator or parameters: ")) return text;
+  constexpr std::string_view kEnd = ". Give what it was made with, or begin anew without --resume";
+  if (cut("other ")) {
+    const std::string option = option_of(text);
+    return option.empty() ? fmt::format("it was made for a scene with another {}{}", text, kEnd)
+                          : fmt::format("it was made with another {}{}", option, kEnd);
+  }
+  const size_t end = text.find('=');
+  const std::string name = text.substr(0, end), option = option_of(name), values = text.substr(end + 1);
+  if (name == "version") return fmt::format("it was made by version {} of lumicut{}", values, kEnd);
+  if (name == "denoise" || name == "groups" || name == "illuminance")
+    return fmt::format("it was made {} {}{}", values.starts_with('0') ? "without" : "with", option, kEnd);
+  return fmt::format("it was made with {}{}{}", option.empty() ? "-p " + name + "=" : option + " ", values, kEnd);
 }
 
 class RenderCommand {
@@ -379,7 +423,7 @@ class RenderCommand {
     if (desc_.checkpoint == nullptr ||
         (result != LUMICUT_INVALID_ARGUMENT && result != LUMICUT_INVALID_STATE && result != LUMICUT_UNSUPPORTED))
       return io::check(api(), result, "render");
-    throw io::FileError(o_.checkpoint, api().last_error());
+    throw io::FileError(o_.checkpoint, refusal_of_checkpoint(api().last_error()));
   }
 
   // Waits for the end of a render, which Ctrl-C may hasten. `tell(whether the status is known)` ten times a second.

@@ -68,7 +68,12 @@ class Progressive(Compared):
         other = lumicut(*arguments, "--resume", "--passes", "4", "--seed", "5")
         self.assertNotEqual(other.returncode, OK)
         self.assertIn("render.checkpoint", other.stderr)
-        self.assertIn("another scene, size, integrator or parameters: seed=1 instead of 5", other.stderr)
+        self.assertEqual(other.stderr, f"lumicut: {kept}: it was made with --seed 1 instead of 5. Give what it was made with, or begin anew "
+                                       "without --resume\n")
+        for words, said in ((("-p", "clamp_lights=9"), "-p clamp_lights=40 instead of 9"), (("--spp", "2"), "--spp 1 instead of 2"),
+                            (("--crop", "0,0,8,8"), "another --crop"), (("--rays", "fast"), "another --accel, --builder or --rays")):
+            self.assertIn("it was made with " + said, lumicut(*arguments, "--resume", "--passes", "4", *words).stderr)
+        self.assertIn("it was made without --groups. ", lumicut(*arguments, "--resume", "--passes", "4", "--groups").stderr)
         kept.write_bytes(kept.read_bytes()[:-100])
         damaged = lumicut(*arguments, "--resume", "--passes", "4")
         self.assertNotEqual(damaged.returncode, OK)
