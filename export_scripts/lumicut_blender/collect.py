@@ -504,9 +504,14 @@ class Collector:
                 mesh.transforms.append(rows(instance.matrix_world))
                 for of in names:
                     if of[0] in mesh_attributes.OF_INSTANCE:
-                        mesh.of_instances.setdefault(self.materials.attribute_number(of), []).append(mesh_attributes.of_instance(of, instance))
+                        mesh.of_instances.setdefault(self.materials.attribute_number(of), []).append(self._of_instance(of, instance))
                 self._own(mesh, ob)
                 self.instances += 1
+
+    def _of_instance(self, name, instance):
+        if name[0] == "instancer" and mesh_attributes.is_of_nodes(instance):
+            self.report.note(f"{instance.parent.name} ({name[1]})", "Attributes of instances by geometry nodes, taken as properties of the object")
+        return mesh_attributes.of_instance(name, instance)
 
     def _add_points(self, instance, ob, override):
         cloud = ob.data
@@ -531,7 +536,7 @@ class Collector:
             for of in dict.fromkeys(self.materials.converted[number].attributes()):
                 values = None
                 if of[0] in mesh_attributes.OF_INSTANCE:
-                    values = [mesh_attributes.of_instance(of, instance)] * len(transforms)
+                    values = [self._of_instance(of, instance)] * len(transforms)
                 elif of[0] == "layer":
                     values = self._of_points(ob, of[1], radii > 0)
                 if values is not None:
@@ -563,7 +568,7 @@ class Collector:
         target = self._meshes[key]
         if target is not None:
             transform = rows(instance.matrix_world)
-            own = {self.materials.attribute_number(name): mesh_attributes.of_instance(name, instance)
+            own = {self.materials.attribute_number(name): self._of_instance(name, instance)
                    for name in dict.fromkeys(a for n in numbers for a in self.materials.converted[n].attributes())
                    if name[0] in mesh_attributes.OF_INSTANCE}
             if is_flat(transform):

@@ -2,12 +2,13 @@
 """What texture programs ask of meshes and objects: coordinates, colour and other attributes, random numbers.
 
 An attribute is named by a tuple: ("uv", map), ("tangent", map), what tangents follow, ("layer", name), ("generated",), ("undisplaced",), ("island",) are of meshes; ("strand", output) of
-hair and curves; ("object", output),
-("property", name), ("world_to_object",) and ("object_to_world",) of instances.
+hair and curves; ("object", output), ("property", name), ("instancer", name), ("world_to_object",) and ("object_to_world",)
+of instances.
 """
+import bpy
 import numpy as np
 
-OF_INSTANCE = {"object", "property", "world_to_object", "object_to_world"}
+OF_INSTANCE = {"object", "property", "instancer", "world_to_object", "object_to_world"}
 WIDTHS = {"FLOAT": ("value", 1), "INT": ("value", 1), "INT8": ("value", 1), "BOOLEAN": ("value", 1), "FLOAT_VECTOR": ("vector", 3),
           "FLOAT2": ("vector", 2), "FLOAT_COLOR": ("color", 4), "BYTE_COLOR": ("color", 4)}
 MASK = 0xFFFFFFFF
@@ -38,13 +39,13 @@ def random_of(instance):
     return number / MASK
 
 
-def property_of(ob, name):
-    """A custom or built-in property of an object or its data: up to four numbers."""
+def property_of(owners, name):
+    """A custom or built-in property of the first owner that has it: up to four numbers."""
     plain = name.strip("[]\"'")
-    for owner in (ob, ob.data):
+    for owner in owners:
         if owner is None:
             continue
-        value = owner.get(plain)
+        value = owner.get(plain) if isinstance(owner, bpy.types.ID) else None
         if value is None and "." not in plain:
             value = getattr(owner, plain, None)
         try:
@@ -56,6 +57,21 @@ def property_of(ob, name):
     return None
 
 
+def is_of_nodes(instance):
+    """Whether geometry nodes make it, whose own attributes Python does not tell."""
+    return instance.is_instance and instance.particle_system is None and instance.parent.instance_type == "NONE"
+
+
+def owners_of(instance, instancer):
+    """Whose properties an instance shows, first those of what makes it where that is asked for."""
+    makers = []
+    if instancer and instance.is_instance:
+        system = instance.particle_system
+        makers = [system, system.settings] if system is not None else []
+        makers.append(instance.parent)
+    return [*makers, instance.object, instance.object.data]
+
+
 def of_instance(name, instance):
     """Numbers of one instance."""
     ob = instance.object
@@ -64,8 +80,8 @@ def of_instance(name, instance):
         m = instance.matrix_world
         m = m.inverted_safe() if kind == "world_to_object" else m
         return [x for row in m[:3] for x in row]
-    if kind == "property":
-        found = property_of(ob, name[1]) or [0.0]
+    if kind in ("property", "instancer"):
+        found = property_of(owners_of(instance, kind == "instancer"), name[1]) or [0.0]
         return (found * 3 if len(found) == 1 else found + [0.0] * (3 - len(found)))[:4] + [1.0] * (len(found) < 4)
     what = name[1]
     if what == "Location":

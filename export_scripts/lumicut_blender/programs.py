@@ -148,6 +148,7 @@ def normalize(a):
 
 
 UV_ACTIVE = ("uv", "")
+OWNERS = {"GEOMETRY": "layer", "OBJECT": "property", "INSTANCER": "instancer"}  # of attributes, by the node's type
 POSITION, NORMAL, TRUE_NORMAL = Expr("position", mean=0), Expr("normal", 0, mean=0), Expr("normal", 1, mean=0)
 TO_VIEWER, BEHIND = Expr("to_viewer", mean=0), Expr("behind", mean=0)
 
@@ -441,9 +442,9 @@ class Compiler:
 
     def _attribute(self, node, output, stack):
         kind = getattr(node, "attribute_type", "GEOMETRY")
-        if kind not in ("GEOMETRY", "OBJECT"):
+        if kind not in OWNERS:
             raise CannotCompile(f"Attribute of the {kind.lower().replace('_', ' ')}")
-        name = ("layer" if kind == "GEOMETRY" else "property", node.attribute_name)
+        name = OWNERS[kind], node.attribute_name
         if output.name == "Alpha":
             return attribute(name, 1, 1.0)
         return grey(attribute(name), 1) if output.name == "Fac" else attribute(name)

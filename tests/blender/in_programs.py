@@ -201,6 +201,33 @@ class Inputs(Board):
         self.link(self.coordinates(), product.inputs[1])
         self.compare(product.outputs[0])
 
+    def made_by_collection(self):
+        tiles = bpy.data.collections.new("Tiles")
+        tiles.objects.link(self.ob)
+        self.scene.collection.objects.unlink(self.ob)
+        for place, tone in ((-0.6, (0.9, 0.3, 0.1)), (0.6, (0.1, 0.7, 0.4))):
+            maker = h.link(bpy.data.objects.new("maker", None))
+            maker.instance_type, maker.instance_collection = "COLLECTION", tiles
+            maker.location.x, maker.scale = place, (0.2, 0.2, 0.2)
+            maker["tone"] = tone
+
+    def made_by_vertices(self):
+        maker = h.add_plane(1, name="maker")
+        maker["tone"], maker.data["glow"] = (0.9, 0.3, 0.1), 0.9  # of which Cycles does not ask the mesh
+        maker.instance_type = "VERTS"
+        self.ob.parent, self.ob.scale = maker, (0.1, 0.1, 0.1)
+
+    def test_custom_properties_of_what_makes_instances(self):
+        """Of the object itself where that has none, and of objects that nothing makes."""
+        for make, kind, name in self.each([(make, kind, name)
+                                           for make in (None, self.made_by_collection, self.made_by_vertices)
+                                           for kind in ("INSTANCER", "OBJECT")
+                                           for name in (("tone", "glow") if make else ("tone",))]):
+            self.ob["tone"], self.ob["glow"] = (0.2, 0.3, 0.8), 0.37
+            if make is not None:
+                make()
+            self.compare(self.node("Attribute", {"attribute_type": kind, "attribute_name": name}).outputs["Color"])
+
     def test_fresnel_and_layer_weight_with_normals(self):
         for kind, name, socket, value in self.each([("Fresnel", 0, "IOR", 1.4), ("LayerWeight", "Fresnel", "Blend", 0.3),
                                                     ("LayerWeight", "Facing", "Blend", 0.7)]):
