@@ -29,6 +29,7 @@ NORMAL_MAPS_BY_SLOPE = bpy.app.version >= (4, 3, 0)
 # Of area lamps whose axes are oblique. Measured.
 SHEARED_FROM_CORNER = bpy.app.version < (4, 3, 0)
 SHEARED_DISKS_LOSE_SPREAD = bpy.app.version >= (4, 3, 0)
+RECTANGLES_NEED_NO_AXIS = bpy.app.version < (4, 3, 0)  # to shine on both sides; disks do. Measured
 NORMALS_BY_COFACTORS = bpy.app.version >= (4, 3, 0)  # in Vector Transform; 3.4 turns them as vectors. Measured
 FLAT_RECTS = bpy.app.version >= (4, 1, 0)  # pixels of passes are set as one row of numbers
 

@@ -284,6 +284,8 @@ def _converted(name, light, matrix, images, report, profiles, picture_number, em
             return falloffs.spread(out, radius)
         out.radius = radius
     m = np.array(matrix)[:3]
+    if light.type == "AREA" and compiled is None and not m[:, 2].any():
+        return sheared.without_axis(out)
     if light.type == "AREA" and sheared.is_sheared(*edges_of(light, m), m[:, 2], out.type == library.DISK):
         if compiled is None:
             sheared.apply(name, light, out, *edges_of(light, m), -m[:, 2], report, profiles)

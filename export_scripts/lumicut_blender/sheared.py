@@ -18,6 +18,7 @@ from .lumicut import library
 
 SIDE = 8  # a rectangle is SIDE x SIDE points
 STRAIGHT = 1e-3  # cosine of axes that are upright
+UPRIGHT = 0.98  # cosine of a rectangle's axis to its plane's normal, below which the side that it lights is told from the plane's
 FLATTEST = 0.02  # cosine of light on what it lights, below which no table makes up for how it bends
 
 
@@ -26,14 +27,25 @@ def _unit(v):
 
 
 def is_sheared(u, v, z, is_round):
-    cosines = [_unit(u) @ _unit(v)] + ([_unit(u) @ _unit(z), _unit(v) @ _unit(z)] if is_round else [])
-    return max(map(abs, cosines)) > STRAIGHT
+    u, v, z = _unit(u), _unit(v), _unit(z)
+    if is_round:
+        return max(abs(u @ v), abs(u @ z), abs(v @ z)) > STRAIGHT
+    return abs(u @ v) > STRAIGHT or abs(_unit(np.cross(u, v)) @ z) < UPRIGHT
 
 
 def _frame(forward):
     """Axes of a lamp that shines along `forward`."""
     x = _unit(np.cross(forward, (0, 0, 1) if abs(forward[2]) < 0.9 else (1, 0, 0)))
     return np.column_stack([x, np.cross(-forward, x), -forward])
+
+
+def without_axis(lamp):
+    """Lamps that stand for one whose parent has no scale along its axis: no direction is behind such a rectangle."""
+    if not compat.RECTANGLES_NEED_NO_AXIS or lamp.type == library.DISK or lamp.spread < math.pi - 1e-3:
+        return []
+    other = library.Light.from_buffer_copy(lamp)
+    other.v[:] = [-x for x in lamp.v]
+    return [lamp, other]
 
 
 def apply(name, light, out, u, v, forward, report, profiles):

@@ -82,15 +82,32 @@ class LightUnits(unittest.TestCase):
                                                     ("ELLIPSE", flat, 2.2 if compat.SHEARED_FROM_CORNER else math.pi, BLOCK),
                                                     ("DISK", tilted, math.pi, 0.08)):
             with self.subTest(shape=shape, scale=scale):
-                self.setUp()
-                parent = h.link(bpy.data.objects.new("Parent", None))
-                parent.scale, parent.location = scale, (0.3, 0.2, 1.5)
-                lamp = h.add_light("AREA", (0, 0, 0), 100, turn, shape=shape, size=1.0, spread=spread)
-                lamp.data.size_y = 0.6
-                lamp.parent = parent
+                self.lamp_below(scale, turn, shape=shape, spread=spread).data.size_y = 0.6
                 self.agree(samples=256, block=block, lights=10000)
                 said = [note for note in h.last_notes() if "heared" in note]
                 self.assertEqual(bool(said), shape == "RECTANGLE" or turn == tilted[1], said)
+
+    def test_area_lamps_whose_parent_has_no_scale_along_one_axis(self):
+        """Along the lamp's own: rectangles light both sides before 4.3, others nothing. Along another: the lamp's axis lies in
+        its plane, and what is before it is lit from both of its sides."""
+        for shape, spread, turned in (("SQUARE", math.pi, 1), ("SQUARE", math.pi, -1), ("SQUARE", 2.2, 1), ("DISK", math.pi, 1)):
+            with self.subTest(shape=shape, spread=spread, turned=turned):
+                self.lamp_below((1, turned, 0), (0, 0, 0), shape=shape, spread=spread)
+                if compat.RECTANGLES_NEED_NO_AXIS and shape == "SQUARE" and spread == math.pi:
+                    self.agree(samples=256, lights=4000, of_pixel=1)
+                else:
+                    self.assertEqual([h.radiance(image).max() for image in self._both(4, 100, 1)], [0, 0])
+        self.lamp_below((1, 0, 1), (0.5, 0.3, 0), shape="SQUARE")
+        self.agree(samples=256, block=0.3, lights=4000, of_pixel=1)  # a plane of points, seen from its edge
+        self.assertTrue(any("Sheared rectangles" in note for note in h.last_notes()))
+
+    def lamp_below(self, scale, turn, **values):
+        self.setUp()
+        parent = h.link(bpy.data.objects.new("Parent", None))
+        parent.scale, parent.location = scale, (0.3, 0.2, 1.5)
+        lamp = h.add_light("AREA", (0, 0, 0), 100, turn, size=1.0, **values)
+        lamp.parent = parent
+        return lamp
 
     def test_tilted_spot(self):
         h.add_light("SPOT", (1.5, 0, 2.5), 200, (0, math.radians(35), 0), spot_size=math.radians(90), spot_blend=0.3,
