@@ -20,7 +20,7 @@ inline constexpr uint32_t kNoId = 0xffffffffu;
 // Limit of a scene's coordinates: the difference of two is a valid direction in every backend.
 inline constexpr float kLargestCoordinate = 9e17f;
 
-// A flag of rays of occlusion queries: they run from a light to what it lights. Without it, the other way.
+// A flag of rays: they run from a light to what it lights. Without it, the other way.
 inline constexpr uint32_t kFromLight = 1;
 
 // Fields in Embree's order (RTCRay). `dir` need not be a unit vector; distances are in units of its length.
@@ -34,7 +34,9 @@ struct Ray {
   uint32_t id = 0;
   uint32_t flags = 0;  // kFromLight; others are ignored
 
-  Vec3f towards_light() const { return (flags & kFromLight) != 0 ? -dir : dir; }
+  Vec3f towards_light() const { return turned_to_light(dir); }
+  // `along`: its direction in another space.
+  Vec3f turned_to_light(const Vec3f& along) const { return (flags & kFromLight) != 0 ? -along : along; }
 };
 
 // Fields in Embree's order (RTCHit). `ng` is not normalised and is in the mesh's own space: an instance's transform has
@@ -52,8 +54,7 @@ struct RayHit {
   Hit hit;
 };
 
-// Where a ray meets a surface. `dir`, of any length, is in the mesh's own space: the ray's, of occlusion queries the one
-// towards the light.
+// Where a ray meets a surface. `dir`, of any length, is in the mesh's own space, and leads towards the light.
 struct CandidateHit {
   uint32_t mesh, inst, prim;  // as in Hit
   float u, v;

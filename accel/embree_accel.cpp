@@ -60,16 +60,13 @@ struct FilterUser {
 // Of one ray or a packet, which Embree has taken to the mesh's space.
 CandidateHit candidate(const RTCFilterFunctionNArguments* args, uint32_t mesh, unsigned i) {
   const unsigned n = args->N;
-  return {mesh,
-          RTCHitN_instID(args->hit, n, i, 0),
-          RTCHitN_primID(args->hit, n, i),
-          RTCHitN_u(args->hit, n, i),
-          RTCHitN_v(args->hit, n, i),
-          {RTCRayN_dir_x(args->ray, n, i), RTCRayN_dir_y(args->ray, n, i), RTCRayN_dir_z(args->ray, n, i)}};
-}
-CandidateHit light_candidate(const RTCFilterFunctionNArguments* args, uint32_t mesh, unsigned i) {
-  CandidateHit hit = candidate(args, mesh, i);
-  if ((RTCRayN_flags(args->ray, args->N, i) & kFromLight) != 0) hit.dir = -hit.dir;
+  CandidateHit hit{mesh,
+                   RTCHitN_instID(args->hit, n, i, 0),
+                   RTCHitN_primID(args->hit, n, i),
+                   RTCHitN_u(args->hit, n, i),
+                   RTCHitN_v(args->hit, n, i),
+                   {RTCRayN_dir_x(args->ray, n, i), RTCRayN_dir_y(args->ray, n, i), RTCRayN_dir_z(args->ray, n, i)}};
+  if ((RTCRayN_flags(args->ray, n, i) & kFromLight) != 0) hit.dir = -hit.dir;
   return hit;
 }
 void on_filter(const RTCFilterFunctionNArguments* args) {
@@ -81,7 +78,7 @@ void on_filter(const RTCFilterFunctionNArguments* args) {
 void on_light_filter(const RTCFilterFunctionNArguments* args) {
   const auto& user = *static_cast<const FilterUser*>(args->geometryUserPtr);
   for (unsigned i = 0; i < args->N; ++i)
-    if (args->valid[i] != 0 && user.filter->passes_light(light_candidate(args, user.mesh, i))) args->valid[i] = 0;
+    if (args->valid[i] != 0 && user.filter->passes_light(candidate(args, user.mesh, i))) args->valid[i] = 0;
 }
 
 // Embree binds an allocator of each building thread to the scene's. When memory runs out during that, it stays bound to

@@ -85,7 +85,8 @@ LightPaths trace_paths(const Scene& scene, const LightSampler& emitters, const V
   for (uint32_t step = 0; step < options.max_depth + kMostStraight && !paths.empty(); ++step) {
     rays.assign(paths.size(), {});
     for (size_t i = 0; i < paths.size(); ++i)
-      rays[i].ray.org = paths[i].origin, rays[i].ray.dir = paths[i].direction, rays[i].ray.mask = paths[i].kind;
+      rays[i].ray.org = paths[i].origin, rays[i].ray.dir = paths[i].direction, rays[i].ray.mask = paths[i].kind,
+      rays[i].ray.flags = kFromLight;
     scene.accel().intersect(rays);
     size_t alive = 0;
     for (size_t i = 0; i < paths.size(); ++i) {
@@ -97,7 +98,7 @@ LightPaths trace_paths(const Scene& scene, const LightSampler& emitters, const V
           (mesh.mask & kDiffuseRay) != 0 && (!path.first() || in_set(mesh.not_lit_by, path.reach.receivers));
       const SurfaceInteraction at = scene.interaction(rays[i]);
       if (stopped && !lights && !at.bsdf.passes_straight()) continue;  // nobody sees it
-      path.flux *= at.bsdf.transmittance_to(at.t, path.absorption);
+      path.flux *= at.bsdf.transmittance_to(at.t, path.absorption) * scene.stopped_share(rays[i]);
       if (!stopped) {
         // Lit, and no shadow behind it: half of the paths stay, half go on.
         if (lights) path.flux = path.flux * 2.0f;

@@ -375,7 +375,7 @@ bool Scene::passes_light(const CandidateHit& hit) const {
   const Mesh& mesh = meshes_[hit.mesh];
   const uint32_t id = mesh.material_of(hit.prim);
   const uint32_t instance_index = hit.inst != kNoId ? hit.inst - first_instance_[hit.mesh] : 0;
-  float stops = opacity(hit.mesh, hit.prim, hit.u, hit.v, instance_index, &hit.dir, true);
+  float stops = opacity(hit.mesh, hit.prim, hit.u, hit.v, instance_index, &hit.dir);
   if (stops > 0.0f && materials_[id].shadows_pass) {
     const uint32_t* t = &mesh.indices[3 * size_t{hit.prim}];
     Vec3f corner = mesh.positions[t[0]];
@@ -411,8 +411,8 @@ bool Scene::passes_light(const CandidateHit& hit) const {
   return passes_by_chance(stops, hit.mesh, hit.prim, hit.u, hit.v);
 }
 
-float Scene::opacity(uint32_t mesh_id, uint32_t prim, float u, float v, uint32_t instance_index, const Vec3f* local_dir,
-                     bool from_front) const {
+float Scene::opacity(uint32_t mesh_id, uint32_t prim, float u, float v, uint32_t instance_index,
+                     const Vec3f* local_dir) const {
   const Mesh& mesh = meshes_[mesh_id];
   const Material& material = materials_[mesh.material_of(prim)];
   float opacity = material.opacity;
@@ -423,15 +423,30 @@ float Scene::opacity(uint32_t mesh_id, uint32_t prim, float u, float v, uint32_t
     if (program->varies_with_view())
       to_viewer = local_dir == nullptr ? mean_view(place.geometric_normal)
                                        : -normalize(instance(mesh_id, instance_index).vector(*local_dir));
-    if (from_front && dot(to_viewer, place.geometric_normal) < 0.0f) to_viewer = -to_viewer;
-    const SurfaceView view{place.position, place.geometric_normal, place.normal, to_viewer, place.offset};
-    return opacity * std::clamp(programmed(*program, view, place.uv, &place).x, 0.0f, 1.0f);
+    return programmed_opacity(place, *program, to_viewer);
   }
   if (!mesh.uvs.empty()) {
     const Vec2f at = uv_at(mesh, prim, u, v);
     opacity *= textures_[material.opacity_texture].mask(at.x, at.y);
   }
   return opacity;
+}
+
+float Scene::programmed_opacity(const SurfaceHit& place, const TextureProgram& program, const Vec3f& to_viewer) const {
+  const SurfaceView view{place.position, place.geometric_normal, place.normal, to_viewer, place.offset};
+  return materials_[place.material].opacity * std::clamp(programmed(program, view, place.uv, &place).x, 0.0f, 1.0f);
+}
+
+float Scene::stopped_share(const RayHit& from_light) const {
+  constexpr float kMost = 10.0f;  // brighter lights would show as spots
+  const Hit& hit = from_light.hit;
+  const int32_t texture = materials_[meshes_[hit.geom].material_of(hit.prim)].opacity_texture;
+  const TextureProgram* program = texture < 0 ? nullptr : textures_[texture].program();
+  if (program == nullptr || !program->varies_with_view()) return 1.0f;
+  const SurfaceHit place = place_on(hit.geom, hit.prim, hit.u, hit.v, instance_of(hit));
+  const float seen = programmed_opacity(place, *program, -from_light.ray.dir),
+              stopped = programmed_opacity(place, *program, from_light.ray.dir);
+  return seen < kMost * stopped ? seen / stopped : kMost;
 }
 
 float Scene::offset_at(const Vec3f& position) const {

@@ -136,8 +136,11 @@ class Scene final : private HitFilter {
   Rgb emitted_on_average(const SurfaceHit& hit, const Vec3f& normal) const;
   // Share of rays that a place of a triangle stops: factor times mask.
   // `local_dir`: of the ray, in the mesh's own space; without one it is about the mean over views from the front.
-  float opacity(uint32_t mesh, uint32_t prim, float u, float v, uint32_t instance = 0, const Vec3f* local_dir = nullptr,
-                bool from_front = false) const;
+  float opacity(uint32_t mesh, uint32_t prim, float u, float v, uint32_t instance = 0,
+                const Vec3f* local_dir = nullptr) const;
+  // Of light that such a ray brought and a surface stopped: what is reflected, which is seen from the ray's side, as a share
+  // of what does not pass, which would be seen from the other. Bounded.
+  float stopped_share(const RayHit& from_light) const;
   // Whether what surfaces look like depends on the camera.
   bool asks_for_camera() const { return asks_for_camera_; }
 
@@ -153,6 +156,7 @@ class Scene final : private HitFilter {
                       const Vec2f (&corners)[3]) const;
   // By the normal texture, a program: the normal itself, in the world.
   Vec3f programmed_normal(const TextureProgram& program, const SurfaceHit& hit, const Vec3f& to_viewer) const;
+  float programmed_opacity(const SurfaceHit& place, const TextureProgram& program, const Vec3f& to_viewer) const;
   Rgb programmed(const TextureProgram& program, const SurfaceView& view, Vec2f uv, const SurfaceHit* hit) const;
   Vec3f bumped_normal(const Material& material, const Vec3f& normal, Vec2f uv, const Vec3f& along_u,
                       const Vec3f& along_v) const;

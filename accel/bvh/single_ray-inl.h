@@ -147,7 +147,8 @@ HWY_NOINLINE void closest_hit(const TraceScene& scene, const WideBvh& bvh, uint3
             if (!(t[lane] < r.ray.tfar) && !(t[lane] == r.ray.tfar && !nearer && r.hit.geom == kNoId)) continue;
             if constexpr (C::kFilters)
               if ((scene.filtered[block.geom[lane]] & kFilterAll) != 0 &&
-                  scene.filter->passes({block.geom[lane], instance_id, block.prim[lane], u[lane], v[lane], dir}))
+                  scene.filter->passes(
+                      {block.geom[lane], instance_id, block.prim[lane], u[lane], v[lane], r.ray.turned_to_light(dir)}))
                 continue;
             nearer = true;
             r.ray.tfar = t[lane];

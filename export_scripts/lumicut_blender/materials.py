@@ -231,9 +231,10 @@ class SurfaceReader(Evaluator):
             kept, share = (b, f) if a.clear else (a, rest)
             if a.clear and b.clear:
                 return dataclasses.replace(a, filter=self.add(self.multiply(rest, a.filter), self.multiply(f, b.filter)))
-            if share.picture is not None and share.picture.is_by_view() and only_gloss(kept):
-                return dataclasses.replace(filtering(b if kept is a else a, self), clearcoat=ClearCoat(1.0, kept.roughness, index_like(share)))
-            self.taken_as_clear(a if a.clear else b)
+            clear = a if a.clear else b
+            if is_tinted(clear) and share.picture is not None and share.picture.is_by_view() and only_gloss(kept):
+                return dataclasses.replace(filtering(clear, self), clearcoat=ClearCoat(1.0, kept.roughness, index_like(share)))
+            self.taken_as_clear(clear)
             return dataclasses.replace(kept, opacity=self.multiply(share, kept.opacity), shadows_pass=shadows_pass or kept.shadows_pass)
         return self.weighted(rest, a, f, b)
 
@@ -696,8 +697,6 @@ class Materials:
                 if np.ptp(linear) < 1e-6:
                     value = Value(np.round(value.mean(), 6))
                 else:
-                    if slot == "opacity" and (ray == "shadow" or not surface.by_ray) and np.ptp(linear - linear[:, ::-1]) > 1e-3:
-                        self.report.note(name, "Holes on one side, which to light are as from the front")
                     value = Value(value.factor, ProgramPicture(name, of_picture(value.picture)))
             if slot == "emission" and (value.mean() < -1e-3).any():
                 self.report.note(name, "Emission below 0 left out")

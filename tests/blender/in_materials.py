@@ -336,13 +336,14 @@ class Materials(unittest.TestCase):
         np.testing.assert_allclose(a.mean((0, 1)), b.mean((0, 1)), rtol=0.02)
         self.assertEqual(h.last_notes(), [])
 
-    def mixed_with_holes(self, name, colour, factor):
-        """Transparent and a diffuse colour; factor(tree): the output that says how much of the second there is."""
+    def mixed_with_holes(self, name, factor, kind="BsdfDiffuse", **inputs):
+        """Transparent and another shader; factor(tree): the output that says how much of the second there is."""
         m = h.material(name)
         tree = m.node_tree
-        mix, clear, matt = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("MixShader", "BsdfTransparent", "BsdfDiffuse"))
-        matt.inputs["Color"].default_value = (*colour, 1)
-        for source, socket in ((factor(tree), 0), (clear.outputs[0], 1), (matt.outputs[0], 2)):
+        mix, clear, shader = (tree.nodes.new(f"ShaderNode{name}") for name in ("MixShader", "BsdfTransparent", kind))
+        for socket, value in inputs.items():
+            shader.inputs[socket].default_value = value
+        for source, socket in ((factor(tree), 0), (clear.outputs[0], 1), (shader.outputs[0], 2)):
             tree.links.new(source, mix.inputs[socket])
         tree.links.new(mix.outputs[0], next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL").inputs["Surface"])
         return m
@@ -364,10 +365,10 @@ class Materials(unittest.TestCase):
             return rest.outputs[0]
 
         h.set_world((0.5, 0.5, 0.5))
-        wall = self.mixed_with_holes("wall", (0.8, 0.4, 0.2), from_behind)
+        wall = self.mixed_with_holes("wall", from_behind, Color=(0.8, 0.4, 0.2, 1))
         h.add_mesh("Front", [(-2, -2, 1), (2, -2, 1), (2, 2, 1), (-2, 2, 1)], [(3, 2, 1, 0)], wall)  # its back to the camera
         h.add_mesh("Floor", [(-2, -2, -2), (2, -2, -2), (2, 2, -2), (-2, 2, -2)], [(0, 1, 2, 3)], wall)
-        h.add_sphere(0.6, material=self.mixed_with_holes("veil", (0.1, 0.3, 0.8), facing), segments=48)
+        h.add_sphere(0.6, material=self.mixed_with_holes("veil", facing, Color=(0.1, 0.3, 0.8, 1)), segments=48)
         bpy.context.scene.camera.location = (0, 0, 5)
         bpy.context.scene.camera.data.type, bpy.context.scene.camera.data.ortho_scale = "ORTHO", 2
         ours, theirs = h.both(256, 64, 0)
@@ -399,6 +400,28 @@ class Materials(unittest.TestCase):
             means.append(a)
         self.assertLess(means[0], 1e-3)
         self.assertGreater(means[1], 0.5)
+
+    def test_bodies_of_gloss_and_transparency_by_fresnel(self):
+        """From inside all is reflected towards the edge: the body is dark there, and its shadow, as each side counts by itself."""
+        for light in ("sky", "sun"):
+            with self.subTest(light=light):
+                scene = h.new_scene(32, 32)
+                h.add_plane(6, material=h.diffuse((0.6, 0.5, 0.4), "floor"))
+                glass = self.mixed_with_holes("glass", lambda tree: tree.nodes.new("ShaderNodeFresnel").outputs[0],
+                                              "BsdfGlossy", Roughness=0.0, Color=(1, 1, 1, 1))
+                h.add_sphere(0.8, (0, 0, 0.85), glass, 48)
+                scene.camera.location, scene.camera.rotation_euler = (0, -4, 2.5), (1.1, 0, 0)
+                if light == "sky":
+                    h.set_world((0.5, 0.6, 0.8))
+                else:
+                    h.add_light("SUN", energy=3, angle=0.6, rotation=(0.6, 0.3, 0))
+                with h.quiet():
+                    h.set_cycles(256, 12)
+                    theirs = h.radiance(h.render())
+                    h.set_lumicut("lightcuts", 4, passes=8, vpls=2000, compensate=True, max_depth=12)
+                    ours = h.radiance(h.render())
+                self.assertEqual(h.last_notes(), [])
+                self.assertAlmostEqual(ours.mean() / theirs.mean(), 1, delta=0.04)  # glints are rare
 
     def panes(self, shader):
         """A floor half under a pane that `shader` makes of its tree, seen from above: Cycles' means of both halves and ours."""
