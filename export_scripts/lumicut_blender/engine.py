@@ -159,7 +159,8 @@ class LumicutEngine(bpy.types.RenderEngine):
                 for part, beside in catching.values():
                     part.upload(beside, self._check)
                 catching = {name: beside for name, (_, beside) in catching.items()}
-            of_hits = passes.hit_passes_of(data, layer, motions) if hits else None
+            held = None if self.is_preview else passes.holdouts(data)
+            of_hits = passes.hit_passes_of(data, layer, motions, held) if hits or held else None
             seen = {} if self.is_preview else passes.scenes_beside(data, layer, lambda aov: collect.Collector(
                 depsgraph, None, self._check, max_shininess=settings.max_shininess, aov=aov).collect())
             frames = {name: (part, library.Scene(device, **tracing)) for name, part in seen.items()}

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Passes of what the camera sees first, from the hits of the frame's own samples: indices of objects and materials, texture
-coordinates, and Cryptomatte. [Friedman and Jones 2015: Cryptomatte, specification 1.2]
+coordinates, what is held out, and Cryptomatte. [Friedman and Jones 2015: Cryptomatte, specification 1.2]
 
 As Cycles has them: indices are of a pixel's first sample, texture coordinates its mean, and Cryptomatte ranks by coverage
 what a pixel's samples meet."""
@@ -13,6 +13,7 @@ from .lumicut import library
 
 MOST_PASSES = 64  # of a render, whose samples are looked at: coverage is known to a percent or two by then
 BAND = 1 << 18    # hits at once
+HELD_OUT = "Held out"  # a pass for Combined alone: the share of samples that meet holdouts
 CRYPTOMATTES = {"object": "CryptoObject", "material": "CryptoMaterial", "asset": "CryptoAsset"}
 
 
@@ -71,10 +72,10 @@ def uv_map_of_hits(mesh):
 class HitPasses:
     """Made from collected data that knows its objects. `kinds`: of CRYPTOMATTES; `levels`: how many a pixel has;
     `indices`: names of the passes of objects and materials; `uvs`: whether there is one of texture coordinates; `motions`:
-    a motion.Motion, or None."""
+    a motion.Motion, or None; `held`: of each material whether it is a holdout, or None."""
 
-    def __init__(self, data, kinds, levels, indices, uvs, motions=None):
-        self.motions = motions
+    def __init__(self, data, kinds, levels, indices, uvs, motions=None, held=None):
+        self.motions, self._held = motions, None if held is None else np.array(held)
         self.kinds, self.levels, self.indices, self.uvs = kinds, levels, indices, uvs
         self.ids = {kind: Ids() for kind in kinds}
         self._first = np.cumsum([0] + [len(mesh.transforms) for mesh in data.meshes])
@@ -121,6 +122,8 @@ class HitPasses:
         if self.indices:
             out[self.indices[0]] = np.where(seen, self._object_index[place], 0)[:, 0]
             out[self.indices[1]] = np.where(seen, self._material_index[hits["material"]], 0)[:, 0]
+        if self._held is not None:
+            out[HELD_OUT] = (seen & self._held[np.where(seen, hits["material"], 0)]).mean(1)
         if self.uvs:
             out["UV"] = self._uv(hits, seen)
         for kind in self.kinds:

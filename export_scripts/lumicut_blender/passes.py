@@ -86,11 +86,17 @@ def wanted(layer):
     return chosen
 
 
-def hit_passes_of(data, layer, motions=None):
+def holdouts(data):
+    """Of each material whether it is one, where Combined shows that by alpha alone; else None."""
+    held = [bool(values.flags & library.HOLDOUT) for _, values in data.materials]
+    return held if any(held) and not data.transparent else None
+
+
+def hit_passes_of(data, layer, motions=None, held=None):
     names = {row[0] for row in wanted(layer)}
     rows = [BESIDE[f"use_pass_{what}_index"][0] for what in ("object", "material")]
     return hit_passes.HitPasses(data, cryptomattes(layer), layer.pass_cryptomatte_depth,
-                                rows if names & set(rows) else None, layer.use_pass_uv, motions)
+                                rows if names & set(rows) else None, layer.use_pass_uv, motions, held)
 
 
 def scenes_beside(data, layer, collect_aov):
@@ -333,6 +339,8 @@ class Filler:
         out[..., :3] = radiance
         if self.scene.render.film_transparent:
             out[..., 3:] = self.channel("alpha")
+        elif hit_passes.HELD_OUT in self._beside:
+            out[..., 3:] -= self._beside[hit_passes.HELD_OUT]
         return out
 
     def depth(self):

@@ -195,12 +195,12 @@ class Rays(BesideCycles):
                 self.assertEqual(notes, "")
 
     def test_holdouts_are_holes_to_the_camera(self):
-        """Black, and clear where the film is; their shadows stay, and mirrors show them."""
-        self.scene.render.film_transparent = True
+        """Black, and clear on any film; their shadows stay, and mirrors show them."""
         mirror = h.material("mirror")
         h.shader(mirror, "ShaderNodeBsdfGlossy", Roughness=0.0, Color=(0.9, 0.9, 0.9, 1))
-        for floor, shader in ((h.diffuse(), False), (mirror, False), (h.diffuse(), True)):
-            with self.subTest(floor=floor.name, shader=shader):
+        for floor, shader, clear in ((h.diffuse(), False, True), (mirror, False, True), (h.diffuse(), True, True), (h.diffuse(), True, False)):
+            with self.subTest(floor=floor.name, shader=shader, clear=clear):
+                self.scene.render.film_transparent = clear
                 self.scene.objects["Plane"].data.materials[0] = floor
                 self.ball.is_holdout = not shader
                 if shader:
