@@ -25,9 +25,9 @@ Material burley(float roughness) {
   return m;
 }
 
-Material plastic(float roughness) {
+Material plastic(float roughness, float diffuse_roughness = 0.0f) {
   Material m = burley(roughness);
-  m.burley = false, m.specular = {1, 1, 1};
+  m.burley = false, m.specular = {1, 1, 1}, m.diffuse_roughness = diffuse_roughness;
   return m;
 }
 
@@ -131,7 +131,7 @@ std::unique_ptr<Scene> wall_against_the_sun(const Material& floor_material) {
 
 TEST(LobedLights, OfAFloorLightAWallAgainstTheSunAsPathsDoInEveryIntegrator) {
   const test::RenderOptions options{.width = 16, .height = 12, .samples = 4};
-  for (const Material& material : {oren_nayar(0.5f), burley(1.0f), plastic(0.5f)}) {
+  for (const Material& material : {oren_nayar(0.5f), burley(1.0f), plastic(0.5f), plastic(0.5f, 0.7f)}) {
     const auto scene = wall_against_the_sun(material);
     const double truth = test::mean_luminance(test::render(*scene, "path_tracer", {}, {{"samples", "16"}},
                                                            {.width = 16, .height = 12, .samples = test::trimmed(64)})
