@@ -17,11 +17,26 @@ HWY_BEFORE_NAMESPACE();
 namespace lumicut::HWY_NAMESPACE {
 namespace {  // one includer, traverse.cpp: functions with one caller are inlined
 
+// A leaf that stopped a ray; no tree: none did.
+struct Stopper {
+  const WideBvh* bvh = nullptr;
+  uint32_t instance_id = kNoId, leaf = 0;  // a child word
+};
+
+template <class C>
+using WithoutInstances = SceneConfig<C::kRobust, C::kBoxes, C::kMasks, C::kFilters, false>;
+
+inline Ray local_ray(const TraceScene::Instance& instance, const Ray& r) {
+  Ray local = r;
+  local.org = local_point(instance, r.org), local.dir = local_vector(instance, r.dir);
+  return local;
+}
+
 // True when something that stops light lies in (r.tnear, r.tfar) below child word `start`. Children are visited in the
-// order stored by collapse().
+// order stored by collapse(). `stopper`, where given, is set to what it was.
 template <class C>
 HWY_NOINLINE bool any_hit(const TraceScene& scene, const WideBvh& bvh, uint32_t instance_id, uint32_t start,
-                          const Ray& r) {
+                          const Ray& r, Stopper* stopper = nullptr) {
   const D8 d8;
   const D4 d4;
   const Slabs<C::kRobust> slabs(r.org, r.dir);
@@ -53,19 +68,28 @@ HWY_NOINLINE bool any_hit(const TraceScene& scene, const WideBvh& bvh, uint32_t 
     if constexpr (C::kInstances) {
       const uint32_t id = current & ~kLeafBit;
       const TraceScene::Instance& instance = scene.instances[id];
-      Ray local = r;
-      local.org = local_point(instance, r.org), local.dir = local_vector(instance, r.dir);
-      using Inner = SceneConfig<C::kRobust, C::kBoxes, C::kMasks, C::kFilters, false>;
-      if (any_hit<Inner>(scene, *instance.bvh, id, instance.bvh->root, local)) return true;
+      const Ray local = local_ray(instance, r);
+      if (any_hit<WithoutInstances<C>>(scene, *instance.bvh, id, instance.bvh->root, local, stopper)) return true;
     } else {
       const LeafBlock& block = bvh.leaves[current & ~kLeafBit];
       HitLanes hits;
       const uint32_t hit = intersect_block<C, C::kFilters>(scene, block, lanes, tnear4, tfar4, r.mask, hits);
-      if (any_lane_stops<C>(scene, block, instance_id, r, hit, hits)) return true;
+      if (any_lane_stops<C>(scene, block, instance_id, r, hit, hits)) {
+        if (stopper != nullptr) *stopper = {&bvh, instance_id, current};
+        return true;
+      }
     }
     if (top == 0) return false;
     current = stack[--top];
   }
+}
+
+// Whether it stops this ray too.
+template <class C>
+HWY_INLINE bool stops_again(const TraceScene& scene, const Stopper& stopper, const Ray& r) {
+  const uint32_t id = stopper.instance_id;
+  return any_hit<WithoutInstances<C>>(scene, *stopper.bvh, id, stopper.leaf,
+                                      id == kNoId ? r : local_ray(scene.instances[id], r));
 }
 
 // Shortens r.ray.tfar to the closest hit and fills r.hit. The nearest child is visited first. `org` and `dir`: the ray
