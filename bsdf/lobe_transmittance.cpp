@@ -1,6 +1,7 @@
 #include "bsdf/lobe_transmittance.h"
 
 #include <array>
+#include <mutex>
 
 #include "bsdf/facet_integral.h"
 
@@ -71,30 +72,36 @@ class RoughnessRow {
   std::array<Albedo, kRoughness> of_;
 };
 
-// Lobes that reflect Fresnel's share for indices above 1, or below.
+// Lobes that reflect Fresnel's share for indices above 1, or below. Rows are filled when they are asked for, as a scene has
+// few indices.
 class ShareTable {
  public:
-  explicit ShareTable(bool thinner) {
-    for (int k = 0; k < kRatios; ++k) {
-      const float step = static_cast<float>(k) / (kRatios - 1), root = kLargestRoot * step * step;
-      const float ior = thinner ? (1.0f - root) / (1.0f + root) : (1.0f + root) / (1.0f - root);
-      rows_[k].fill([ior](float cosine) { return fresnel_share(cosine, ior); });
-    }
-  }
-  Seen seen(const TablePlace& k, const TablePlace& r, const TablePlace& c) const {
-    return between(rows_[k.cell].seen(r, c), rows_[k.cell + 1].seen(r, c), k.rest);
+  explicit ShareTable(bool thinner) : thinner_(thinner) {}
+  Seen seen(const TablePlace& k, const TablePlace& r, const TablePlace& c) {
+    return between(row(k.cell).seen(r, c), row(k.cell + 1).seen(r, c), k.rest);
   }
 
  private:
+  const RoughnessRow& row(int k) {
+    std::call_once(filled_[k], [&] {
+      const float step = static_cast<float>(k) / (kRatios - 1), root = kLargestRoot * step * step;
+      const float ior = thinner_ ? (1.0f - root) / (1.0f + root) : (1.0f + root) / (1.0f - root);
+      rows_[k].fill([ior](float cosine) { return fresnel_share(cosine, ior); });
+    });
+    return rows_[k];
+  }
+
+  bool thinner_;
+  std::array<std::once_flag, kRatios> filled_;
   std::array<RoughnessRow, kRatios> rows_;
 };
 
-const ShareTable& shares_of(float ior) {
+ShareTable& shares_of(float ior) {
   if (ior < 1.0f) {
-    static const ShareTable thinner(true);
+    static ShareTable thinner(true);
     return thinner;
   }
-  static const ShareTable denser(false);
+  static ShareTable denser(false);
   return denser;
 }
 
@@ -113,10 +120,12 @@ LobeTransmittance lobe_transmittance(float f0, float f90, float ior, float alpha
   const TablePlace r = table_place(std::sqrt(std::max(0.0f, alpha)), kRoughness),
                    c = table_place(std::sqrt(std::max(0.0f, cosine)), kCosines),
                    k = table_place(std::sqrt(std::abs(ior - 1.0f) / (ior + 1.0f) / kLargestRoot), kRatios);
-  Seen all = mirrors().seen(r, c), share = shares_of(ior).seen(k, r, c);
+  const float rest = f90 - f0;
+  Seen all = mirrors().seen(r, c), share{};
+  if (rest != 0.0f) share = shares_of(ior).seen(k, r, c);
   // A mirror's are known: the table would blur the step where total reflection begins.
   if (alpha < kLeastAlpha) all.albedo = 1.0f, share.albedo = fresnel_share(cosine, ior);
-  const float rest = f90 - f0, normal = 1.0f - f0 * all.straight - rest * share.straight;
+  const float normal = 1.0f - f0 * all.straight - rest * share.straight;
   const float falloff = normal > 0.0f ? (f0 * all.rise + rest * share.rise) / normal : 0.0f;
   return {std::max(0.0f, 1.0f - f0 * all.albedo - rest * share.albedo), std::min(1.0f, std::max(0.0f, falloff))};
 }
