@@ -137,7 +137,7 @@ TEST(Identity, LightProfilesCountByTheirContent) {
   EXPECT_NE(hash(0.5f), hash_value(0, LightProfiles{}));
 }
 TEST(Identity, EveryFieldOfASetOfVirtualLightsCounts) {
-  EXPECT_EQ(expect_every_field_counts(VplSet{{Vpl{}, Vpl{}}, 3, 1, 0, 1, 1, {}, {}}), 40u);
+  EXPECT_EQ(expect_every_field_counts(VplSet{{Vpl{}, Vpl{}}, 3, 1, 0, 1, 1, {}, {}, {}}), 40u);
 }
 TEST(Identity, EveryFieldOfAScenesConfigurationCounts) { EXPECT_GE(expect_every_field_counts(Scene::Config{}), 3u); }
 
