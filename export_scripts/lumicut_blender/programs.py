@@ -488,7 +488,7 @@ class Compiler:
         distance = self.get(node, stack, "Distance")
         if node.invert:
             distance = number_math("MULTIPLY", distance, const(-1))
-        # A share of a pixel, since 4.3; 1 in files from before.
+        # Of newer Blender: a share of a pixel.
         width = number_math("MULTIPLY", self.get(node, stack, "Filter Width"), const(self.reader.pixel)) if "Filter Width" in node.inputs \
             else const(self.reader.pixel)
         return Expr("bump", 0, (self.get(node, stack, "Height"), self.get(node, stack, "Strength"), distance,
