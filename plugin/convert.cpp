@@ -605,7 +605,8 @@ HostVpls from_vpls(const VplSet& set) {
     const bool area = v.cell > 0.0f;
     out.origins[i].source = i >= set.direct ? LUMICUT_SOURCE_PATH : area ? LUMICUT_SOURCE_AREA : LUMICUT_SOURCE_POINT;
     out.origins[i].offset = v.offset, out.origins[i].area = v.cell;
-    if (i >= set.direct && i - set.direct < set.lobes.size()) give_lobe(set.lobes[i - set.direct], out.origins[i]);
+    const bool lobed = v.kind == VplKind::oriented && i >= set.direct && i - set.direct < set.lobes.size();
+    if (lobed) give_lobe(set.lobes[i - set.direct], out.origins[i]);
   }
   out.light_paths = set.light_paths, out.emitter_samples = set.extended;
   return out;

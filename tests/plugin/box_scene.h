@@ -70,6 +70,13 @@ inline std::vector<lumicut_material> materials() {
   return m;
 }
 
+// The same, none of them Lambert's.
+inline std::vector<lumicut_material> rough_materials() {
+  std::vector<lumicut_material> m = materials();
+  for (lumicut_material& material : m) material.flags |= LUMICUT_OREN_NAYAR, material.roughness = 0.8f;
+  return m;
+}
+
 inline lumicut_light lamp() {
   auto l = make<lumicut_light>();
   l.type = LUMICUT_RECTANGLE;

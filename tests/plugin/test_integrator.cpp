@@ -406,6 +406,20 @@ TEST(Integrators, SpheresGoOutAndComeInAgainWithTheirRadii) {
     }
 }
 
+TEST(Integrators, SpheresOnRoughSurfacesGoOutWithoutALobeAndComeInAgain) {
+  const api::Device device(2);
+  api::Scene s = scene(device, false);
+  s.set_materials(rough_materials());
+  s.commit();
+  api::Integrator first = integrator(device), second = integrator(device);
+  first.set("virtual_lights", "spheres");
+  const auto image = render(first, s);
+  const auto set = first.vpls();
+  for (const lumicut_vpl_origin& o : set.origins) EXPECT_EQ(o.slope, 0) << "a lobe is of oriented lights alone";
+  second.set_vpls(set);
+  EXPECT_EQ(render(second, s), image);
+}
+
 TEST(Integrators, PointsOfAHostAreNotTakenForSpheres) {
   const api::Device device(1);
   const api::Scene s = scene(device);

@@ -92,6 +92,20 @@ TEST(State, OfSpheresRendersTheSameImage) {
   EXPECT_CODE(load(points, s, bytes), LUMICUT_INVALID_ARGUMENT, "virtual_lights=spheres");
 }
 
+TEST(State, OfRoughSurfacesRendersTheSameImageWithPointsAndSpheres) {
+  const api::Device device(2);
+  api::Scene s = scene(device, false);
+  s.set_materials(rough_materials());
+  s.commit();
+  for (const char* kind : {"points", "spheres"}) {
+    api::Integrator first = integrator(device, 1000, "wspd"), second = integrator(device, 1000, "wspd");
+    first.set("virtual_lights", kind), second.set("virtual_lights", kind);
+    const auto image = render(first, s);
+    ASSERT_EQ(load(second, s, save(first)), LUMICUT_OK) << kind << ": " << lumicut_last_error();
+    EXPECT_EQ(render(second, s), image) << kind;
+  }
+}
+
 TEST(State, AnotherCameraUsesWhatWasPrepared) {
   const api::Device device(2);
   api::Scene s = scene(device);
