@@ -56,11 +56,19 @@ float scattered_by_shading_normal(const SurfaceInteraction& at, const ScatterSam
   return up < kMostTilted * down ? up / down : kMostTilted;
 }
 
-// Of the surface beneath, for light that comes along `direction`; by the geometric normal, as its virtual light leaves.
+// Of the surface beneath. Its virtual light leaves by the geometric normal: so the lobe is turned from the shading one to that
+// as a whole, and keeps the mean that it has by the shading normal.
 DiffuseLobe diffuse_lobe_of(const SurfaceInteraction& at, const Vec3f& direction) {
   const SurfacePoint& p = at.bsdf.layers()[0];
   if (!p.lobed()) return {};
-  return {reflect(-direction, at.side()), p.slope, p.again, p.retro, p.dim, p.falloff, mean_diffuse_factor(p)};
+  const Vec3f side = at.side();
+  const float leans = 1.0f + dot(p.normal, side);
+  Vec3f mirror = reflect(-direction, side);
+  if (p.normal != side && leans > 0.1f) {
+    const Vec3f both = p.normal + side;
+    mirror = normalize(p.mirror - both * (dot(both, p.mirror) / leans) + side * (2.0f * dot(p.normal, p.mirror)));
+  }
+  return {mirror, p.slope, p.again, p.retro, p.dim, p.falloff, mean_diffuse_factor(p)};
 }
 
 // Follows paths [first, last) in step, so that rays are traced in batches.
