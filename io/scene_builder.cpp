@@ -550,9 +550,11 @@ void SceneBuilder::set_bump(const PaintRef& height, double scale, lumicut_materi
   lumicut_instruction in{};
   in.op = LUMICUT_OP_BUMP;
   in.inputs[0] = compile(decoded(height, false), program);
-  for (const double x : {1.0, scale})
+  const auto number = [&](double x) {
     for (int k = 0; k < 3; ++k) program.constants.push_back(static_cast<float>(x));
-  in.inputs[2] = -static_cast<int32_t>(program.constants.size() / 3), in.inputs[1] = in.inputs[2] + 1;
+    return -static_cast<int32_t>(program.constants.size() / 3);
+  };
+  in.inputs[1] = number(1), in.inputs[2] = number(scale), in.inputs[4] = number(0);  // the library's own width
   lumicut_instruction normal{};
   normal.op = LUMICUT_OP_NORMAL;
   program.instructions.push_back(normal);

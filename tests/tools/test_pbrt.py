@@ -341,6 +341,17 @@ class Pbrt(SceneFiles):
         counts = json.loads(lumicut("check", "--no-forecast", "--json", scene).stdout)["counts"]
         self.assertEqual((counts["meshes"], counts["instances"]), (4, 301))
 
+    def test_bumps_of_computed_heights_take_their_slopes_over_the_librarys_own_width(self):
+        """Over the first step's value, such as u, bricks were flat."""
+        path = self.write("bumps.pbrt", HEAD + 'Camera "perspective"\nWorldBegin\n'
+                          'Texture "t" "float" "checkerboard" "float uscale" 8 "float vscale" 8 "float tex1" .1 "float tex2" 0\n'
+                          'Material "diffuse" "texture displacement" "t"\nShape "sphere"\n')
+        done = lumicut("convert", path, self.folder / "bumps.json")
+        self.assertEqual(done.returncode, OK, done.stderr)
+        programs = json.loads((self.folder / "bumps.json").read_text())["programs"]
+        bumps = [step for program in programs for step in program["steps"] if step["op"] == "bump"]
+        self.assertEqual([step["inputs"][4] for step in bumps], [[0, 0, 0]])
+
     def test_textures_of_numbers_and_of_colours_may_share_a_name(self):
         found = self.square('Texture "t" "spectrum" "constant" "rgb value" [ .3 .4 .5 ] Texture "t" "float" "constant" "float value" .25',
                             'Texture "both" "spectrum" "scale" "texture tex" "t" "texture scale" "t"', 'Material "diffuse" "texture reflectance" "both"')[0]
