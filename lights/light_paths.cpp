@@ -68,7 +68,12 @@ DiffuseLobe diffuse_lobe_of(const SurfaceInteraction& at, const Vec3f& direction
     const Vec3f both = p.normal + side;
     mirror = normalize(p.mirror - both * (dot(both, p.mirror) / leans) + side * (2.0f * dot(p.normal, p.mirror)));
   }
-  return {mirror, p.slope, p.again, p.retro, p.dim, p.falloff, mean_diffuse_factor(p)};
+  // Burley's edges are of the shading normal, and turn with nothing: even where that leans by 10 degrees or more.
+  constexpr float kEven = 0.985f;
+  SurfacePoint lobed = p;
+  const float kept = std::clamp((dot(p.normal, side) - kEven) / (1.0f - kEven), 0.0f, 1.0f);
+  lobed.retro *= kept, lobed.dim *= kept;
+  return {mirror, p.slope, p.again, lobed.retro, lobed.dim, p.falloff, mean_diffuse_factor(lobed)};
 }
 
 // Follows paths [first, last) in step, so that rays are traced in batches.

@@ -66,6 +66,7 @@ TEST(VplFile, LightsComeBackBitForBit) {
                            0.1f,
                            1,
                            0.5f,
+                           0.3f,
                            0.9f});
   set.light_paths = 1234, set.emitter_samples = 40;
   write_vpls(folder / "a.vpl", set);
