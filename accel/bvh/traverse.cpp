@@ -26,23 +26,13 @@ void trace_closest_singly(const TraceScene& scene, RayHit* rays, size_t n) {
 }
 template <class C>
 void trace_any_singly(const TraceScene& scene, Ray* rays, size_t n) {
-  // Rays that follow each other, such as those of a lamp to neighbours, often meet the same; others seldom do, and are not
-  // asked for long.
-  constexpr size_t kFew = 16;
-  Stopper last;
-  int worth = n < kFew ? 0 : 2;
+  Stopper last;  // rays that follow each other, such as those of a lamp to neighbours, often meet the same
   for (size_t i = 0; i < n; ++i) {
     Ray r = rays[i];
     if (!is_traceable(r, scene.limits) || r.mask == 0) continue;
     r.tnear = std::max(r.tnear, 0.0f);
-    if (last.bvh != nullptr) {
-      if (stops_again<C>(scene, last, r)) {
-        worth = std::min(worth + 1, 4), rays[i].tfar = -kInf;
-        continue;
-      }
-      --worth, last = {};
-    }
-    if (any_hit<C>(scene, *scene.top, kNoId, scene.top->root, r, worth > 0 ? &last : nullptr)) rays[i].tfar = -kInf;
+    if (last.bvh != nullptr && !stops_again<C>(scene, last, r)) last = {};
+    if (last.bvh != nullptr || any_hit<C>(scene, *scene.top, kNoId, scene.top->root, r, &last)) rays[i].tfar = -kInf;
   }
 }
 
