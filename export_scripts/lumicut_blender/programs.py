@@ -589,7 +589,7 @@ class Compiler:
             found = octave(larger)
             if edges:
                 nearer = mix(amplitude, total, number_math("MINIMUM", total, number_math("DIVIDE", found, larger)))
-                total = mix(share, total, number_math("MINIMUM", total, nearer) if i > detail else nearer)
+                total = mix(share, total, nearer)
                 if farthest is not None:
                     whole = mix(share, whole, mix(amplitude, whole, number_math("DIVIDE", farthest, larger)))
             else:
